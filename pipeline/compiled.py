@@ -67,7 +67,11 @@ def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
                 # what it emits is made by other functions and constants there, too
                 there = sys.modules[value._defn.__module__]
                 yield _source(there)
-                numbers = {name: one for name, one in vars(there).items() if isinstance(one, int | float | tuple)}
+                numbers = {
+                    name: constant
+                    for name, constant in vars(there).items()
+                    if isinstance(constant, int | float | tuple)
+                }
                 yield repr(sorted(numbers.items())).encode()
         elif isinstance(value, np.ndarray):
             yield name.encode() + value.tobytes()
@@ -76,9 +80,9 @@ def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
 
 
 @cache
-def _source(one: Any) -> bytes:
+def _source(definition: Any) -> bytes:
     """Return the source of a function or module, found once: it goes into each of its callers."""
-    return inspect.getsource(one).encode()
+    return inspect.getsource(definition).encode()
 
 
 class _Whole:
@@ -105,5 +109,6 @@ class OfTheUser(_Whole, caching.UserWideCacheLocator):  # type: ignore[misc, unu
 
 
 config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined, unused-ignore]
-    [f"{__name__}.{one.__name__}" for one in (Given, Beside, OfTheUser)] + ["IPythonCacheLocator", "ZipCacheLocator"]
+    [f"{__name__}.{place.__name__}" for place in (Given, Beside, OfTheUser)]
+    + ["IPythonCacheLocator", "ZipCacheLocator"]
 )

@@ -52,10 +52,10 @@ class Configuration(BaseModel):
 
 def value_of(configuration: Configuration, name: str) -> str | None:
     """Return a setting by its name in `settings.VARIABLES`."""
-    found: Any = configuration
+    value: Any = configuration
     for part in name.split("."):
-        found = getattr(found, part)
-    return None if found is None else str(found)
+        value = getattr(value, part)
+    return None if value is None else str(value)
 
 
 def parse(content: dict[str, Any], where: str) -> Configuration:

@@ -58,7 +58,7 @@ def faults_of(error: ValidationError, whole: str, content: Any = None) -> list[s
     ...     faults_of(error, "model")
     ["current: found 'sideways', expected 'earth', 'lateral' or 'none'", 'wnid: there is no such key']
     """
-    return [f"{_place(one['loc'], content) or whole}: {_fault(one)}" for one in error.errors()]
+    return [f"{_place(fault['loc'], content) or whole}: {_fault(fault)}" for fault in error.errors()]
 
 
 def _place(loc: tuple[int | str, ...], content: Any) -> str:
@@ -69,8 +69,8 @@ def _place(loc: tuple[int | str, ...], content: Any) -> str:
     return ".".join(map(str, place))[:80]
 
 
-def _fault(one: Any) -> str:
-    kind, found, context = one["type"], one["input"], one.get("ctx", {})
+def _fault(fault: Any) -> str:
+    kind, value, context = fault["type"], fault["input"], fault.get("ctx", {})
     if kind == "missing":
         return "the key is missing"
     if kind == "extra_forbidden":
@@ -79,20 +79,20 @@ def _fault(one: Any) -> str:
         most = kind == "too_long"
         limit = context["max_length" if most else "min_length"]
         entries = "entry" if limit == 1 else "entries"
-        return f"found {len(found)} entries, expected at {'most' if most else 'least'} {limit} {entries}"
+        return f"found {len(value)} entries, expected at {'most' if most else 'least'} {limit} {entries}"
     if kind == "value_error":
-        return str(one["msg"]).removeprefix("Value error, ")
+        return str(fault["msg"]).removeprefix("Value error, ")
     expected = _EXPECTED.get(kind)
     if expected is None:
-        return f"found {_shown(found)}: {one['msg']}"
-    return f"found {_shown(found)}, expected {expected.format(**context)}"
+        return f"found {_shown(value)}: {fault['msg']}"
+    return f"found {_shown(value)}, expected {expected.format(**context)}"
 
 
-def _shown(found: Any) -> str:
-    if found is None:
+def _shown(value: Any) -> str:
+    if value is None:
         return "nothing"
     try:
-        text = repr(found)
+        text = repr(value)
     except ValueError:  # an integer of thousands of digits is not written out
-        return f"a {type(found).__name__} too long to show"
+        return f"a {type(value).__name__} too long to show"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

@@ -46,8 +46,8 @@ class Quality(Limits):
         """Return how many findings of a kind a vessel may have; None: any number."""
         own = self.vessels.get(vessel)
         chosen: Limits = own if own is not None and kind in own.model_fields_set else self
-        found: int | None = getattr(chosen, kind, None)
-        return found
+        limit: int | None = getattr(chosen, kind, None)
+        return limit
 
 
 def in_words(kind: str, count: int) -> str:

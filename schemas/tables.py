@@ -52,9 +52,9 @@ _PROFILE = Column("profile_sha256", "text", "hash of the vessel profile")
 _SET = Column("parameter_set_id", "text", "hash of what produced the parameter set")
 
 _TALLY = tuple(
-    Column(f"{what}_{done}", "integer", f"{what} {done}", "1")
-    for what in ("records", "values")
-    for done in ("read", "kept", "rejected")
+    Column(f"{noun}_{outcome}", "integer", f"{noun} {outcome}", "1")
+    for noun in ("records", "values")
+    for outcome in ("read", "kept", "rejected")
 )
 
 _ALL = (

@@ -63,12 +63,12 @@ def factor_to_si(unit: str, si_unit: str, where: str) -> float:
             f"Write one of {', '.join(sorted(TO_SI))}.",
             {"unit": unit, "known": sorted(TO_SI)},
         )
-    found, factor = TO_SI[unit]
-    if found != si_unit:
+    base_unit, factor = TO_SI[unit]
+    if base_unit != si_unit:
         fitting = sorted(u for u, (si, _) in TO_SI.items() if si == si_unit)
         raise UsageError(
             "unit_of_another_quantity",
-            f"{where}: {unit!r} is a unit of {found}, the channel is in {si_unit}.",
+            f"{where}: {unit!r} is a unit of {base_unit}, the channel is in {si_unit}.",
             f"Write one of {', '.join(fitting)}, or map another channel.",
             {"unit": unit, "expected": si_unit},
         )

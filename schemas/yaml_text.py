@@ -69,12 +69,12 @@ def _require_flat(text: str | bytes) -> None:
             raise NotYaml(f"nested deeper than {DEEPEST} brackets {' '.join(str(event.start_mark).split())}")
 
 
-def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
+def _written_out(node: yaml.Node, counts: dict[int, int]) -> int:
     """Return how many keys and values a node stands for, each alias counted as what it stands for."""
-    if id(node) not in known:
-        known[id(node)] = MOST_VALUES + 1  # what a node counts for that holds itself
-        known[id(node)] = 1 + sum(_written_out(item, known) for item in _below(node))
-    return known[id(node)]
+    if id(node) not in counts:
+        counts[id(node)] = MOST_VALUES + 1  # what a node counts for that holds itself
+        counts[id(node)] = 1 + sum(_written_out(item, counts) for item in _below(node))
+    return counts[id(node)]
 
 
 def _below(node: yaml.Node) -> list[yaml.Node]:

@@ -47,16 +47,16 @@ def point(
     UsageError
         ``set_of_another_vessel``, ``moved_meanwhile``.
     """
-    found = parameter_sets.get(warehouse, parameter_set_id)
-    if found.vessel != vessel:
+    parameter_set = parameter_sets.get(warehouse, parameter_set_id)
+    if parameter_set.vessel != vessel:
         raise UsageError(
             "set_of_another_vessel",
-            f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
+            f"{parameter_set.parameter_set_id} is a parameter set of {parameter_set.vessel!r}, not of {vessel!r}.",
             f"List hers with `kempf params list --vessel {vessel!r}`.",
-            {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
+            {"parameter_set_id": parameter_set.parameter_set_id, "vessel": parameter_set.vessel},
         )
     before = {} if isinstance(expected, EllipsisType) else {(vessel, alias): expected}
-    return bool(point_all(warehouse, {(vessel, alias): found.parameter_set_id}, before))
+    return bool(point_all(warehouse, {(vessel, alias): parameter_set.parameter_set_id}, before))
 
 
 def moved_meanwhile(vessel: str, now: str | None, shown: str | None) -> UsageError:
@@ -71,14 +71,14 @@ def moved_meanwhile(vessel: str, now: str | None, shown: str | None) -> UsageErr
 
 def point_all(
     warehouse: Warehouse,
-    wanted: Mapping[tuple[str, str], str],
+    targets: Mapping[tuple[str, str], str],
     expected: Mapping[tuple[str, str], str | None] = MappingProxyType({}),
 ) -> tuple[tuple[str, str], ...]:
     """Let aliases of several vessels point to sets that are stored, in at most one commit.
 
     Parameters
     ----------
-    wanted : mapping of (str, str) to str
+    targets : mapping of (str, str) to str
         Whole ids of the vessels' own parameter sets, by vessel and alias.
     expected : mapping of (str, str) to str or None, optional
         Where some of them are taken to point now, None for nowhere.
@@ -88,11 +88,11 @@ def point_all(
     tuple of (str, str)
         Those that pointed elsewhere before, sorted.
     """
-    for alias in sorted({alias for _, alias in wanted}):
+    for alias in sorted({alias for _, alias in targets}):
         _require_name(alias)
     rows = {
         (vessel, alias): {"vessel_key": vessel_key(vessel), "vessel": vessel, "alias": alias, "parameter_set_id": name}
-        for (vessel, alias), name in sorted(wanted.items())
+        for (vessel, alias), name in sorted(targets.items())
     }
 
     def attempt() -> tuple[tuple[str, str], ...]:
@@ -102,9 +102,9 @@ def point_all(
             stored = {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in known}
             for (vessel, alias), before in expected.items():
                 now = stored.get((vessel, alias))
-                if now not in (before, wanted[vessel, alias]):
+                if now not in (before, targets[vessel, alias]):
                     raise moved_meanwhile(vessel, now, before)
-            changed = tuple(key for key in rows if stored.get(key) != wanted[key])
+            changed = tuple(key for key in rows if stored.get(key) != targets[key])
             if changed:
                 # of one name only: several would also name what is not among them
                 of = {alias: [rows[key]["vessel_key"] for key in changed if key[1] == alias] for _, alias in changed}
@@ -125,7 +125,7 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
 def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     """Return the parameter set id that an alias points to, by vessel, sorted."""
     frame = delta.read(warehouse, "aliases", {})
-    pointed = {str(one["vessel"][0]): _pointed(one) for one in frame.sort("vessel").partition_by("vessel")}
+    pointed = {str(rows["vessel"][0]): _pointed(rows) for rows in frame.sort("vessel").partition_by("vessel")}
     return {vessel: names[alias] for vessel, names in pointed.items() if alias in names}
 
 

@@ -135,13 +135,13 @@ def _joined(digests: dict[str, str]) -> str:
 @cache
 def packages() -> dict[str, str]:
     """Return the versions of Python and of `PACKAGES`; ``absent`` for one that is not installed."""
-    found = {"python": platform.python_version()}
+    versions = {"python": platform.python_version()}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            versions[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "absent"
-    return found
+            versions[name] = "absent"
+    return versions
 
 
 @cache
@@ -154,7 +154,7 @@ def machine() -> dict[str, str]:
         ``system``, ``machine``, ``processor``, and ``environment``: SHA-256 of the names and versions of everything
         that is installed, 64 hex digits, which one lock file makes the same everywhere.
     """
-    installed = sorted({found for one in distributions() if (found := _name_and_version(one))})
+    installed = sorted({package for distribution in distributions() if (package := _name_and_version(distribution))})
     return {
         "system": platform.system(),
         "machine": platform.machine(),
@@ -163,13 +163,13 @@ def machine() -> dict[str, str]:
     }
 
 
-def _name_and_version(one: Distribution) -> str:
+def _name_and_version(distribution: Distribution) -> str:
     """Return ``name==version`` of what is installed, empty where it has no name.
 
     Its properties parse the whole description of the package, twice: a third of a second for all of them.
     """
     # an empty name: the one file that an old egg-info is
-    text = one.read_text("METADATA") or one.read_text("PKG-INFO") or one.read_text("") or ""
+    text = distribution.read_text("METADATA") or distribution.read_text("PKG-INFO") or distribution.read_text("") or ""
     head = message_from_string(text.partition("\n\n")[0])
     return f"{head['Name'].lower()}=={head['Version']}" if head["Name"] else ""
 
@@ -213,7 +213,7 @@ def commit_of(package: Path) -> str | None:
     answer = ""
     for arguments in (tracked, described):
         try:
-            done = subprocess.run(  # noqa: S603 - fixed arguments, no shell
+            process = subprocess.run(  # noqa: S603 - fixed arguments, no shell
                 [git, "--no-optional-locks", "-C", str(package), *arguments],
                 capture_output=True,
                 text=True,
@@ -222,9 +222,9 @@ def commit_of(package: Path) -> str | None:
             )
         except (OSError, subprocess.TimeoutExpired):
             return None
-        if done.returncode != 0:
+        if process.returncode != 0:
             return None
-        answer = done.stdout.strip()
+        answer = process.stdout.strip()
     return answer or None
 
 

@@ -113,11 +113,11 @@ def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:
         ``no_warehouse``.
     """
     provenances = delta.read(warehouse, "parameter_sets", columns=("provenance_json",))
-    found: dict[str, set[int]] = {}
+    versions: dict[str, set[int]] = {}
     for text in provenances["provenance_json"].str.json_path_match("$.table_versions").drop_nulls().unique().to_list():
         for name, version in json.loads(text).items():
-            found.setdefault(name, set()).add(int(version))
-    return {name: tuple(sorted(found[name])) for name in sorted(found)}
+            versions.setdefault(name, set()).add(int(version))
+    return {name: tuple(sorted(versions[name])) for name in sorted(versions)}
 
 
 def vacuum(
@@ -152,12 +152,14 @@ def vacuum(
     opened = {name: delta.open_table(warehouse, name) for name in TABLES}
     tables = {name: table for name, table in opened.items() if table is not None}
     kept = {name: _kept(table, name, named.get(name, ()), older_than_hours) for name, table in tables.items()}
-    done = [_vacuumed(warehouse, name, tables[name], kept[name], older_than_hours, dry_run=dry_run) for name in tables]
+    cleared = [
+        _vacuumed(warehouse, name, tables[name], kept[name], older_than_hours, dry_run=dry_run) for name in tables
+    ]
     halves = _half_written(warehouse, older_than_hours)
     size = sum(path.stat().st_size for path in halves)
     for path in () if dry_run else halves:
         path.unlink(missing_ok=True)
-    return (*done, Cleared("raw", len(halves), size, 0))
+    return (*cleared, Cleared("raw", len(halves), size, 0))
 
 
 def _half_written(warehouse: Warehouse, older_than_hours: float) -> list[Path]:

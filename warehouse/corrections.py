@@ -53,10 +53,10 @@ def all_of(warehouse: Warehouse, log_ids: Iterable[str] | None = None) -> list[S
 
 def of_logs(warehouse: Warehouse, log_ids: Iterable[str]) -> dict[str, tuple[Correction, ...]]:
     """Return the corrections of some logs, by log, in the order in which they were made; logs without are left out."""
-    found: dict[str, tuple[Correction, ...]] = {}
-    for one in all_of(warehouse, log_ids):
-        found[one.log_id] = (*found.get(one.log_id, ()), one.correction)
-    return found
+    corrections: dict[str, tuple[Correction, ...]] = {}
+    for entry in all_of(warehouse, log_ids):
+        corrections[entry.log_id] = (*corrections.get(entry.log_id, ()), entry.correction)
+    return corrections
 
 
 def basis(code: str, corrections: Sequence[Correction]) -> str:
@@ -71,7 +71,7 @@ def basis(code: str, corrections: Sequence[Correction]) -> str:
     """
     if not corrections:
         return code
-    content = [[one.action, one.subject_utc_ns, one.bounds_utc_ns, one.reason] for one in corrections]
+    content = [[c.action, c.subject_utc_ns, c.bounds_utc_ns, c.reason] for c in corrections]
     return sha256(canonical_json([code, content]))[: len(code)]
 
 

@@ -13,7 +13,9 @@ _SAME_INSTANT_S = 2.0
 _SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
 
 
-def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) -> tuple[list[Segment], dict[str, str]]:
+def once(
+    segments: Sequence[Segment], twins: Callable[[Segment, Segment], bool]
+) -> tuple[list[Segment], dict[str, str]]:
     """Return each manoeuvre once, and why the others are left out.
 
     Of twins the longest stays, of equally long ones the first by log.
@@ -25,12 +27,12 @@ def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) ->
     """
     kept: list[Segment] = []
     left: dict[str, str] = {}
-    for one in sorted(found, key=lambda s: (s.start_utc_ns - s.end_utc_ns, s.log_id, s.start_utc_ns)):
-        twin = next((other for other in kept if twins(one, other)), None)
+    for segment in sorted(segments, key=lambda s: (s.start_utc_ns - s.end_utc_ns, s.log_id, s.start_utc_ns)):
+        twin = next((other for other in kept if twins(segment, other)), None)
         if twin is None:
-            kept.append(one)
+            kept.append(segment)
         else:
-            left[one.segment_id] = f"another log holds the same manoeuvre, {twin.segment_id}"
+            left[segment.segment_id] = f"another log holds the same manoeuvre, {twin.segment_id}"
     return kept, left
 
 
@@ -67,7 +69,7 @@ def _measured_alike(one: Segment, other: Segment) -> bool:
     return len(mine) == len(others) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in zip(mine, others, strict=True))
 
 
-def _measured_deg(one: Segment) -> tuple[float, ...]:
+def _measured_deg(segment: Segment) -> tuple[float, ...]:
     """Return how the ship answered, deg: the overshoots, or of a random manoeuvre how far the heading went."""
-    turned = one.detail.get("heading_range_deg")
-    return one.overshoots_deg if turned is None else (float(turned), one.delta0_deg)
+    turned = segment.detail.get("heading_range_deg")
+    return segment.overshoots_deg if turned is None else (float(turned), segment.delta0_deg)

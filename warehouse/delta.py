@@ -76,8 +76,8 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
         """A table whose files polars finds also where the folder's path holds blanks or letters beyond ASCII."""
 
         def file_uris(self, *args: Any, **kwargs: Any) -> list[str]:
-            found = super().file_uris(*args, **kwargs)
-            return [unquote(uri) for uri in found] if warehouse.folder is not None else found
+            uris = super().file_uris(*args, **kwargs)
+            return [unquote(uri) for uri in uris] if warehouse.folder is not None else uris
 
     address = warehouse.address(name)
     if warehouse.folder is not None and not (warehouse.folder / name / "_delta_log").is_dir():
@@ -189,8 +189,8 @@ def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> De
     from deltalake import Schema
 
     held = {field.name for field in table.schema().fields}
-    wanted = Schema.from_arrow(arrow_schema(TABLES[name])).fields
-    missing = [field for field in wanted if field.name not in held]
+    fields = Schema.from_arrow(arrow_schema(TABLES[name])).fields
+    missing = [field for field in fields if field.name not in held]
     if not missing:
         return table
     with refusals_as_errors(warehouse.address(name)):
@@ -415,12 +415,12 @@ def exchange_alone(
         ``disk_full``, ``warehouse_not_writable``.
     """
     schema = _as_described(table, arrow_schema(TABLES[name]))
-    said = {BROUGHT: str(brought_from)}
-    _write_alone(table, new, schema, said, mode="overwrite", predicate=predicate)
+    metadata = {BROUGHT: str(brought_from)}
+    _write_alone(table, new, schema, metadata, mode="overwrite", predicate=predicate)
 
 
 def _write_alone(
-    table: DeltaTable, new: Iterator[pl.DataFrame], schema: pa.Schema, said: Mapping[str, Any] | None, **how: Any
+    table: DeltaTable, new: Iterator[pl.DataFrame], schema: pa.Schema, metadata: Mapping[str, Any] | None, **how: Any
 ) -> None:
     import pyarrow as pa
     from deltalake import CommitProperties, WriterProperties, write_deltalake
@@ -432,7 +432,7 @@ def _write_alone(
             table,
             pa.RecordBatchReader.from_batches(schema, _batches(new, schema)),
             writer_properties=WriterProperties(compression="ZSTD", max_row_group_size=groups),
-            commit_properties=CommitProperties(custom_metadata=dict(said or {}) or None, max_commit_retries=0),
+            commit_properties=CommitProperties(custom_metadata=dict(metadata or {}) or None, max_commit_retries=0),
             **how,
         )
         seals.seal(table)
@@ -453,10 +453,10 @@ def describe_alone(table: DeltaTable, name: str, column: str, brought_from: int)
     from deltalake import CommitProperties
 
     held = arrow_schema(TABLES[name]).field(column).metadata
-    said = CommitProperties(custom_metadata={BROUGHT: str(brought_from)}, max_commit_retries=0)
+    properties = CommitProperties(custom_metadata={BROUGHT: str(brought_from)}, max_commit_retries=0)
     with refusals_as_errors(table.table_uri):
         words = {key.decode(): value.decode() for key, value in held.items()}
-        table.alter.set_column_metadata(column, words, commit_properties=said)
+        table.alter.set_column_metadata(column, words, commit_properties=properties)
         seals.seal(table)
 
 
@@ -510,12 +510,12 @@ def refusals_as_errors(address: str) -> Iterator[None]:
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """Return the newest version of every table that was written, for the provenance of what is made from them."""
-    found = {}
+    newest = {}
     for name in TABLES:
         with reading(warehouse, name) as table:
             if table is not None:
-                found[name] = table.version()
-    return found
+                newest[name] = table.version()
+    return newest
 
 
 def commit_times(table: DeltaTable) -> list[int]:

@@ -142,10 +142,10 @@ def not_described(warehouse: Warehouse) -> dict[str, dict[str, Any]]:
 
     One whose profile is lost is left out.
     """
-    profiles = {one.profile_sha256: one.profile for one in vessels.all_versions(warehouse)}
+    profiles = {version.profile_sha256: version.profile for version in vessels.all_versions(warehouse)}
     known = logs.find(warehouse, raw.kept(warehouse))
     facts = {n: description(r, profiles[r.profile_sha256]) for n, r in known.items() if r.profile_sha256 in profiles}
-    return {name: wanted for name, wanted in sorted(facts.items()) if raw.described(warehouse, name) != wanted}
+    return {name: content for name, content in sorted(facts.items()) if raw.described(warehouse, name) != content}
 
 
 def describe_all(warehouse: Warehouse) -> None:

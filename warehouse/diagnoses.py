@@ -49,7 +49,7 @@ class StoredDiagnosis:
         }
 
 
-def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
+def insert(warehouse: Warehouse, diagnosis: StoredDiagnosis) -> bool:
     """Add a diagnosis; one that is there already changes nothing.
 
     Returns
@@ -58,23 +58,23 @@ def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
         Whether it is new.
     """
     row: dict[str, Any] = {
-        "vessel_key": vessel_key(one.vessel),
-        "vessel": one.vessel,
-        "diagnosis_id": one.diagnosis_id,
-        "parameter_set_id": one.parameter_set_id,
-        "start_utc_ns": one.start_utc_ns,
-        "verdict": one.verdict,
-        "effects": list(one.effects),
-        "content_json": canonical_json(plain(one.content)),
-        "inputs_json": canonical_json(plain(one.inputs, name_non_finite=True)),
-        "code_version": one.code_version,
+        "vessel_key": vessel_key(diagnosis.vessel),
+        "vessel": diagnosis.vessel,
+        "diagnosis_id": diagnosis.diagnosis_id,
+        "parameter_set_id": diagnosis.parameter_set_id,
+        "start_utc_ns": diagnosis.start_utc_ns,
+        "verdict": diagnosis.verdict,
+        "effects": list(diagnosis.effects),
+        "content_json": canonical_json(plain(diagnosis.content)),
+        "inputs_json": canonical_json(plain(diagnosis.inputs, name_non_finite=True)),
+        "code_version": diagnosis.code_version,
     }
 
     def attempt() -> bool:
         with delta.ensured(warehouse, "diagnoses") as table:
-            if delta.rows(table, "diagnoses", {"diagnosis_id": one.diagnosis_id}).height:
+            if delta.rows(table, "diagnoses", {"diagnosis_id": diagnosis.diagnosis_id}).height:
                 return False
-            predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(one.diagnosis_id)}"
+            predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(diagnosis.diagnosis_id)}"
             delta.replace(table, "diagnoses", [row], predicate)
             return True
 
@@ -127,10 +127,10 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
 def by_vessel(warehouse: Warehouse) -> dict[str, list[StoredDiagnosis]]:
     """Return all diagnoses of every vessel that has any, in the order of her manoeuvres, of equal ones by id."""
     frame = delta.read(warehouse, "diagnoses").sort("start_utc_ns", "diagnosis_id")
-    found: dict[str, list[StoredDiagnosis]] = {}
-    for one in map(_stored, frame.rows(named=True)):
-        found.setdefault(one.vessel, []).append(one)
-    return found
+    diagnoses: dict[str, list[StoredDiagnosis]] = {}
+    for diagnosis in map(_stored, frame.rows(named=True)):
+        diagnoses.setdefault(diagnosis.vessel, []).append(diagnosis)
+    return diagnoses
 
 
 def newest(warehouse: Warehouse) -> dict[str, StoredDiagnosis]:

@@ -56,20 +56,20 @@ def codes_of(warehouse: Warehouse) -> Codes:
 def adopt(warehouse: Warehouse, entries: Sequence[Equivalent]) -> None:
     """Let codes count as others, from now on, in one commit."""
     if entries:
-        said.add(warehouse, _TABLE, *({**vars(one), "vessels": list(one.vessels)} for one in entries))
+        said.add(warehouse, _TABLE, *({**vars(entry), "vessels": list(entry.vessels)} for entry in entries))
 
 
 def withdraw(warehouse: Warehouse) -> list[Equivalent]:
     """Let the present code count as itself again; return what it counted as."""
     standing = _standing(warehouse)
     present = {stage: code_version.fingerprint(stage) for stage in code_version.STAGES}
-    taken = [
+    entries = [
         Equivalent(stage, code, standing[stage, code], 0, (), code_version.git_commit())
         for stage, code in present.items()
         if standing.get((stage, code), code) != code
     ]
-    adopt(warehouse, [Equivalent(one.stage, one.code, one.code, 0, (), one.git_commit) for one in taken])
-    return taken
+    adopt(warehouse, [Equivalent(entry.stage, entry.code, entry.code, 0, (), entry.git_commit) for entry in entries])
+    return entries
 
 
 def all_of(warehouse: Warehouse) -> list[Equivalent]:

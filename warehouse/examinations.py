@@ -36,7 +36,7 @@ class StoredExamination:
         return tuple(self.content.get("notes", ()))
 
 
-def replace(warehouse: Warehouse, found: Sequence[StoredExamination]) -> tuple[str, ...]:
+def replace(warehouse: Warehouse, examinations: Sequence[StoredExamination]) -> tuple[str, ...]:
     """Put examinations of some ingests, of any vessels, in place of what is stored of these, in at most one commit.
 
     Returns
@@ -44,33 +44,33 @@ def replace(warehouse: Warehouse, found: Sequence[StoredExamination]) -> tuple[s
     tuple of str
         Ingests of which something changed, sorted.
     """
-    new = {one.ingest_id: _row(one) for one in found}
+    new = {examination.ingest_id: _row(examination) for examination in examinations}
     keys = sorted({row["vessel_key"] for row in new.values()})
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "examinations") as table:
             stored = delta.rows(table, "examinations", {"vessel_key": keys, "ingest_id": sorted(new)}).rows(named=True)
             held = {row["ingest_id"]: row for row in stored}
-            changed = sorted(one for one, row in new.items() if held.get(one) != row)
+            changed = sorted(ingest for ingest, row in new.items() if held.get(ingest) != row)
             if changed:
-                whose = {new[one]["vessel_key"] for one in changed}
+                whose = {new[ingest]["vessel_key"] for ingest in changed}
                 predicate = f"{one_of('vessel_key', whose)} AND {one_of('ingest_id', changed)}"
-                delta.replace(table, "examinations", [new[one] for one in changed], predicate)
+                delta.replace(table, "examinations", [new[ingest] for ingest in changed], predicate)
             return tuple(changed)
 
     return with_retry(attempt) if new else ()
 
 
-def _row(one: StoredExamination) -> dict[str, Any]:
+def _row(examination: StoredExamination) -> dict[str, Any]:
     return {
-        "vessel_key": vessel_key(one.vessel),
-        "vessel": one.vessel,
-        "ingest_id": one.ingest_id,
-        "log_id": one.log_id,
-        "verdict": one.verdict,
-        "findings": list(one.findings),
-        "content_json": canonical_json(plain(one.content)),
-        "code_version": one.code_version,
+        "vessel_key": vessel_key(examination.vessel),
+        "vessel": examination.vessel,
+        "ingest_id": examination.ingest_id,
+        "log_id": examination.log_id,
+        "verdict": examination.verdict,
+        "findings": list(examination.findings),
+        "content_json": canonical_json(plain(examination.content)),
+        "code_version": examination.code_version,
     }
 
 

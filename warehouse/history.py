@@ -173,14 +173,14 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
 
     warehouse.require()
     with _sets_as_of(warehouse, as_of) as table:
-        found = _marked(table, vessel, _logs_of(warehouse, vessel, as_of), _COMPARED)
+        sets = _marked(table, vessel, _logs_of(warehouse, vessel, as_of), _COMPARED)
     kinds: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
-    for row in found.rows(named=True):
+    for row in sets.rows(named=True):
         if not row["superseded"]:
             kinds.setdefault((row["estimator"], row["model_sha256"], row["settings_json"]), []).append(row)
     single = {row["segment_ids"][0] for rows in kinds.values() for row in rows if len(row["segment_ids"]) == 1}
-    known = segments.by_ids(warehouse, vessel, single) if single else {}
-    return [_compared(kinds[kind], known) for kind in sorted(kinds)]
+    manoeuvres = segments.by_ids(warehouse, vessel, single) if single else {}
+    return [_compared(kinds[kind], manoeuvres) for kind in sorted(kinds)]
 
 
 _COMPARED = (
@@ -189,7 +189,7 @@ _COMPARED = (
 )
 
 
-def _compared(rows: list[dict[str, Any]], found: Mapping[str, Segment]) -> Comparable:
+def _compared(rows: list[dict[str, Any]], manoeuvres: Mapping[str, Segment]) -> Comparable:
     """Keep of sets of one kind those that stand for themselves and can be weighed, each manoeuvre once."""
     from kempf.warehouse.deduplicate import once, same
 
@@ -204,7 +204,7 @@ def _compared(rows: list[dict[str, Any]], found: Mapping[str, Segment]) -> Compa
         else:
             kept.append(row)
             seen.add(row["segment_ids"][0])
-    _, twins = once([found[name] for name in sorted(seen) if name in found], same)
+    _, twins = once([manoeuvres[name] for name in sorted(seen) if name in manoeuvres], same)
     if twins:
         left_out["of a manoeuvre that another log holds"] = len(twins)
         kept = [row for row in kept if row["segment_ids"][0] not in twins]
@@ -289,9 +289,9 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     last = {row["log_id"]: row for row in rows.rows(named=True)}
     present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
-    found = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
+    segments = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
     noted = notes.of_vessel(warehouse, vessel, as_of)
-    return _Logs(past, found, noted, code_of(warehouse, "estimate"), as_of is not None)
+    return _Logs(past, segments, noted, code_of(warehouse, "estimate"), as_of is not None)
 
 
 def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:
@@ -304,8 +304,8 @@ def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: d
         if version is None:
             raise
         return None  # what was found then has been deleted since: earlier versions of kempf did not keep it
-    found = rows.filter(rows["excluded"].is_null())["segment_id"].to_list()
-    return found or ([] if examinations.codes(warehouse, ingests, [vessel]) else None)
+    ids = rows.filter(rows["excluded"].is_null())["segment_id"].to_list()
+    return ids or ([] if examinations.codes(warehouse, ingests, [vessel]) else None)
 
 
 def _read(
@@ -329,17 +329,17 @@ def _as_then(table: DeltaTable | None, name: str, vessel: str, where: Where, col
     return pl.concat([delta.rows(table, name, {"vessel_key": key, **where}, columns) for key in keys])
 
 
-def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFrame:
+def _exploded(table: DeltaTable | None, vessel: str, logs: _Logs) -> pl.DataFrame:
     import polars as pl
 
     columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "convergence_json")
     converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
-    marked = _marked(table, vessel, known, columns).with_columns(converged=converged).drop("convergence_json")
+    marked = _marked(table, vessel, logs, columns).with_columns(converged=converged).drop("convergence_json")
     each = marked.explode("parameters", empty_as_null=False)
     return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
 
 
-def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequence[str]) -> pl.DataFrame:
+def _marked(table: DeltaTable | None, vessel: str, logs: _Logs, columns: Sequence[str]) -> pl.DataFrame:
     """Return sets in the order of their start with a column ``superseded``.
 
     A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
@@ -352,7 +352,7 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     needed = ("segment_ids", "provenance_json", "settings_json", "model_sha256", "estimator", "convergence_json")
     extra = [name for name in needed if name not in columns]
     wanted = (*columns, *extra)
-    if known.then:
+    if logs.then:
         sets = _as_then(table, "parameter_sets", vessel, {}, wanted)
     else:
         sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, wanted)
@@ -360,15 +360,15 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
     sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)
     codes = sets["_code"].to_list()
-    newest = known.code if known.code in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
+    newest = logs.code if logs.code in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
     old = pl.col("_code").ne_missing(newest)
-    if known.past:
+    if logs.past:
         # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another
-        old |= provenance.json_path_match("$.ingest_ids").str.contains_any(known.past).fill_null(value=False)
-    if known.segments is not None:
-        old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(known.segments)).list.all()
+        old |= provenance.json_path_match("$.ingest_ids").str.contains_any(logs.past).fill_null(value=False)
+    if logs.segments is not None:
+        old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(logs.segments)).list.all()
     noted = [
-        text is not None and _noted_otherwise(json.loads(text), known.notes) for text in _inputs_with_draughts(sets)
+        text is not None and _noted_otherwise(json.loads(text), logs.notes) for text in _inputs_with_draughts(sets)
     ]
     old |= pl.Series(noted, dtype=pl.Boolean)
     sets = sets.with_columns(superseded=old).drop("_code", "_at")
@@ -382,14 +382,14 @@ def _inputs_with_draughts(sets: pl.DataFrame) -> list[str | None]:
 
     text = pl.col("provenance_json").str
     inputs = pl.when(text.contains('"draughts_m"', literal=True)).then(text.json_path_match("$.inputs"))
-    found: list[str | None] = sets.select(inputs.alias("inputs"))["inputs"].to_list()
-    return found
+    texts: list[str | None] = sets.select(inputs.alias("inputs"))["inputs"].to_list()
+    return texts
 
 
 def _noted_otherwise(inputs: dict[str, Any], among: Sequence[Note]) -> bool:
     """Return whether other draughts are noted now than those that a set goes by."""
     held: dict[str, float] = inputs.get("draughts_m") or {}
-    return bool(held) and notes.draughts_m(among, [Bounds(**one) for one in inputs["segments"]]) != held
+    return bool(held) and notes.draughts_m(among, [Bounds(**segment) for segment in inputs["segments"]]) != held
 
 
 def _with_chains(sets: pl.DataFrame) -> pl.Series:
@@ -401,21 +401,21 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
     rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
     known = {row["parameter_set_id"]: _Rests(row) for row in rows}
-    for one in sorted(known.values(), key=lambda one: one.update.manoeuvres if one.update else 0):
-        if one.update is not None:
+    for rests in sorted(known.values(), key=lambda rests: rests.update.manoeuvres if rests.update else 0):
+        if rests.update is not None:
             # it rests on fewer manoeuvres, so that what that one rests on is known
-            one.on(known.get(one.update.set))
+            rests.on(known.get(rests.update.set))
     kinds: dict[tuple[str, ...], list[_Rests]] = {}
-    for one in known.values():
-        if one.pooled and one.converged and not one.superseded:
-            kinds.setdefault(one.kind, []).append(one)
+    for rests in known.values():
+        if rests.pooled and rests.converged and not rests.superseded:
+            kinds.setdefault(rests.kind, []).append(rests)
     for alike in kinds.values():
         # the largest first: it contains most others, so that few are compared
-        alike.sort(key=lambda one: len(one.segments), reverse=True)
+        alike.sort(key=lambda rests: len(rests.segments), reverse=True)
     return pl.Series(
         [
-            one.superseded or (one.pooled and any(other.replaces(one) for other in kinds.get(one.kind, ())))
-            for one in known.values()
+            rests.superseded or (rests.pooled and any(other.replaces(rests) for other in kinds.get(rests.kind, ())))
+            for rests in known.values()
         ],
         dtype=pl.Boolean,
     )
@@ -433,8 +433,8 @@ class _Rests:
         #: Whether it goes by draughts that were noted.
         self.noted: bool = row["noted"]
         self._id: str = row["parameter_set_id"]
-        asked = canonical_json({key: value for key, value in settings.items() if key not in ("segments", UPDATES)})
-        self.kind = (row["estimator"], row["model_sha256"], asked)
+        request = canonical_json({key: value for key, value in settings.items() if key not in ("segments", UPDATES)})
+        self.kind = (row["estimator"], row["model_sha256"], request)
 
     def on(self, before: _Rests | None) -> None:
         """Rest on another one, too; None where that is lost."""

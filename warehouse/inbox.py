@@ -75,24 +75,24 @@ def by_name(warehouse: Warehouse, name: str) -> InboxFile:
         ``ambiguous_file``: several fit.
     """
     held = quarantined(warehouse)
-    found = [one for one in held if one.address == name] or [
-        one for one in held if name and one.address.endswith(f"/{name.lstrip('/')}")
+    files = [file for file in held if file.address == name] or [
+        file for file in held if name and file.address.endswith(f"/{name.lstrip('/')}")
     ]
-    if not found:
+    if not files:
         raise NotFound(
             "not_in_quarantine",
             f"No file {name!r} is in quarantine in {warehouse.uri}.",
             "List those that are with `kempf logs quarantine`.",
             {"file": name},
         )
-    if len(found) > 1:
+    if len(files) > 1:
         raise UsageError(
             "ambiguous_file",
-            f"{len(found)} files in quarantine fit {name!r}: {', '.join(one.address for one in found[:5])}.",
+            f"{len(files)} files in quarantine fit {name!r}: {', '.join(file.address for file in files[:5])}.",
             "Give more of the address.",
-            {"file": name, "found": [one.address for one in found]},
+            {"file": name, "found": [file.address for file in files]},
         )
-    return found[0]
+    return files[0]
 
 
 def record(warehouse: Warehouse, files: Iterable[InboxFile]) -> tuple[str, ...]:
@@ -103,7 +103,7 @@ def record(warehouse: Warehouse, files: Iterable[InboxFile]) -> tuple[str, ...]:
     tuple of str
         Addresses of those of which something changed, sorted.
     """
-    rows: Mapping[str, dict[str, Any]] = {one.address: asdict(one) for one in files}
+    rows: Mapping[str, dict[str, Any]] = {file.address: asdict(file) for file in files}
     if not rows:
         return ()
 

@@ -75,13 +75,13 @@ def require_apart(held: Iterable[tuple[str, str]]) -> None:
     """
     whose: dict[str, str] = {}
     for key, vessel in held:
-        other = whose.setdefault(key, vessel)
-        if other != vessel:
+        holder = whose.setdefault(key, vessel)
+        if holder != vessel:
             raise UsageError(
                 "vessel_key_taken",
-                f"{vessel!r} would have the same folders as {other!r}: both names have the key {key}.",
+                f"{vessel!r} would have the same folders as {holder!r}: both names have the key {key}.",
                 "Spell one of them otherwise.",
-                {"vessel": vessel, "held_by": other, "vessel_key": key},
+                {"vessel": vessel, "held_by": holder, "vessel_key": key},
             )
 
 

@@ -152,16 +152,16 @@ def record(warehouse: Warehouse, rows: Iterable[LogRow]) -> tuple[LogRow, ...]:
     DataRejected
         ``log_of_another_vessel``; then none of them is recorded.
     """
-    given = list(rows)
-    if not given:
+    ingests = list(rows)
+    if not ingests:
         return ()
 
     def attempt() -> tuple[LogRow, ...]:
         with delta.ensured(warehouse, "logs") as table:
-            known = delta.rows(table, "logs", {"log_id": [row.log_id for row in given]})
-            held = _latest([_row(r) for r in known.rows(named=True)])
+            frame = delta.rows(table, "logs", {"log_id": [row.log_id for row in ingests]})
+            held = _latest([_row(r) for r in frame.rows(named=True)])
             fresh = []
-            for row in given:
+            for row in ingests:
                 last = held.get(row.log_id)
                 refuse_other_vessel(last, row.vessel, row.file_name)
                 if last is None or last.ingest_id != row.ingest_id or last.removed is not None:
@@ -191,8 +191,8 @@ def mark(warehouse: Warehouse, log_ids: Sequence[str], reason: str | None) -> tu
 
     def attempt() -> tuple[LogRow, ...]:
         with delta.ensured(warehouse, "logs") as table:
-            known = delta.rows(table, "logs", {"log_id": sorted(set(log_ids))})
-            held = _latest([_row(r) for r in known.rows(named=True)])
+            frame = delta.rows(table, "logs", {"log_id": sorted(set(log_ids))})
+            held = _latest([_row(r) for r in frame.rows(named=True)])
             changed = [
                 replace(row, revision=row.revision + 1, removed=reason)
                 for _, row in sorted(held.items())
@@ -246,20 +246,22 @@ def by_prefix(warehouse: Warehouse, name: str, *, removed: bool = False) -> LogR
     """
     every = _latest(all_ingests(warehouse)).values()
     rows = [row for row in every if (row.removed is not None) == removed]
-    found = [row for row in rows if name and name in (row.log_id, row.ingest_id, row.file_name)]
-    found = found or [row for row in rows if name and (row.log_id.startswith(name) or row.ingest_id.startswith(name))]
-    if not found:
+    matches = [row for row in rows if name and name in (row.log_id, row.ingest_id, row.file_name)]
+    matches = matches or [
+        row for row in rows if name and (row.log_id.startswith(name) or row.ingest_id.startswith(name))
+    ]
+    if not matches:
         raise NotFound(
             "no_log",
             f"There is no {'removed ' if removed else ''}log {name!r} in {warehouse.uri}.",
             f"List them with `kempf logs list{' --removed' if removed else ''}`.",
             {"log": name},
         )
-    if len(found) > 1:
+    if len(matches) > 1:
         raise UsageError(
             "ambiguous_log",
-            f"{len(found)} logs fit {name!r}: {', '.join(row.log_id[:16] for row in found[:5])}.",
+            f"{len(matches)} logs fit {name!r}: {', '.join(row.log_id[:16] for row in matches[:5])}.",
             "Give more of the id.",
-            {"log": name, "found": [row.log_id for row in found]},
+            {"log": name, "found": [row.log_id for row in matches]},
         )
-    return found[0]
+    return matches[0]

@@ -34,13 +34,13 @@ def write(warehouse: Warehouse, batch: Sequence[tuple[LogRow, LogReadings]]) -> 
             "vessel": row.vessel,
             "ingest_id": row.ingest_id,
             "number": number,
-            "since_utc_ns": one.since_ns,
-            "until_utc_ns": one.until_ns,
-            "messages": one.messages,
-            "why": one.why,
+            "since_utc_ns": stretch.since_ns,
+            "until_utc_ns": stretch.until_ns,
+            "messages": stretch.messages,
+            "why": stretch.why,
         }
         for row, item in damaged
-        for number, one in enumerate(item.lost)
+        for number, stretch in enumerate(item.lost)
     ]
     predicate = one_of("ingest_id", {row.ingest_id for row, _ in damaged})
 
@@ -60,8 +60,8 @@ def of_ingests(warehouse: Warehouse, ingest_ids: Sequence[str]) -> dict[str, tup
         ``no_warehouse``.
     """
     frame = delta.read(warehouse, "lost", {"ingest_id": sorted(set(ingest_ids))}).sort("ingest_id", "number")
-    found: dict[str, tuple[LostStretch, ...]] = {}
+    stretches: dict[str, tuple[LostStretch, ...]] = {}
     for row in frame.rows(named=True):
-        one = LostStretch(row["since_utc_ns"], row["until_utc_ns"], row["messages"], row["why"])
-        found[row["ingest_id"]] = (*found.get(row["ingest_id"], ()), one)
-    return found
+        stretch = LostStretch(row["since_utc_ns"], row["until_utc_ns"], row["messages"], row["why"])
+        stretches[row["ingest_id"]] = (*stretches.get(row["ingest_id"], ()), stretch)
+    return stretches

@@ -31,8 +31,8 @@ class Marker:
         """
         content: dict[str, Any] = {"layout": self.layout, "check": _check(f"layout {self.layout}")}
         if self.migrating is not None:
-            said = f"layout {self.layout} from {self.migrating}"
-            content["migrating"] = {"from": self.migrating, "check": _check(said)}
+            text = f"layout {self.layout} from {self.migrating}"
+            content["migrating"] = {"from": self.migrating, "check": _check(text)}
         return json.dumps(content).encode() + b"\n"
 
 
@@ -44,12 +44,12 @@ def read(data: bytes) -> Marker | None:
         if content.keys() == {"layout"}:  # as it once was; a bit makes a 3 of a 2
             return Marker(layout) if layout < _CHECKED or layout > LAYOUT else None
         started = content["migrating"]["from"] if "migrating" in content else None
-        found = Marker(layout, None if started is None else int(started))
-        return found if json.loads(found.written()) == content else None
+        marker = Marker(layout, None if started is None else int(started))
+        return marker if json.loads(marker.written()) == content else None
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
-def _check(said: str) -> str:
+def _check(text: str) -> str:
     """Return what shows that a number is the one that was written."""
-    return hashlib.sha256(f"kempf {said}".encode()).hexdigest()[:12]
+    return hashlib.sha256(f"kempf {text}".encode()).hexdigest()[:12]

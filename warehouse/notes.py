@@ -138,7 +138,7 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None, as_of: datetime |
         )
         for row in delta.read(warehouse, "notes", where).sort("number").rows(named=True)
     ]
-    return [one for one in every if as_of is None or (one.written is not None and one.written <= as_of)]
+    return [note for note in every if as_of is None or (note.written is not None and note.written <= as_of)]
 
 
 def carry(
@@ -158,12 +158,12 @@ def carry(
         Whose they are to be.
     """
     new_id = to if subject == "vessel" else subject_id
-    there = {one.text for one in of_vessel(warehouse, to) if (one.subject, one.subject_id) == (subject, new_id)}
-    for one in of_vessel(warehouse, vessel):
-        if (one.subject, one.subject_id) == (subject, subject_id):
-            text = f"{one.text} [{vessel}, note {one.number}]"
+    there = {note.text for note in of_vessel(warehouse, to) if (note.subject, note.subject_id) == (subject, new_id)}
+    for note in of_vessel(warehouse, vessel):
+        if (note.subject, note.subject_id) == (subject, subject_id):
+            text = f"{note.text} [{vessel}, note {note.number}]"
             if text not in there:
-                add(warehouse, to, subject, new_id, text, event_utc_ns=one.event_utc_ns, draught_m=one.draught_m)
+                add(warehouse, to, subject, new_id, text, event_utc_ns=note.event_utc_ns, draught_m=note.draught_m)
 
 
 def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, float]:
@@ -188,20 +188,20 @@ def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, flo
     for stretch in sailed:
         first = began_utc_ns.get(stretch.log_id, stretch.start_utc_ns)
         began_utc_ns[stretch.log_id] = min(stretch.start_utc_ns, first)
-    stating = [one for one in among if one.draught_m is not None]
-    own = {one.subject_id: one.draught_m for one in stating if one.subject == "log"}
+    stating = [note for note in among if note.draught_m is not None]
+    own = {note.subject_id: note.draught_m for note in stating if note.subject == "log"}
     dated = [
-        (one.event_utc_ns, one.number, one.draught_m)
-        for one in stating
-        if one.subject == "vessel" and one.event_utc_ns is not None
+        (note.event_utc_ns, note.number, note.draught_m)
+        for note in stating
+        if note.subject == "vessel" and note.event_utc_ns is not None
     ]
-    found = {}
+    draughts = {}
     for log, began in began_utc_ns.items():
-        before = max((one for one in dated if one[0] <= began), default=(0, 0, None))
+        before = max((entry for entry in dated if entry[0] <= began), default=(0, 0, None))
         draught = own.get(log, before[2])
         if draught is not None:
-            found[log] = draught
-    return found
+            draughts[log] = draught
+    return draughts
 
 
 def _written(warehouse: Warehouse, number: int) -> datetime | None:

@@ -46,19 +46,19 @@ def options_of(given: Mapping[str, str] | None = None, environment: Mapping[str,
     ('true', 'us-east-1', 'me')
     """
     variables = os.environ if environment is None else environment
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for name in _PYARROW:
         value = next((variables[n] for n in (name, *_ALSO.get(name, ())) if variables.get(n)), None)
         if value is not None:
-            found[name] = value
-    found |= {key.upper(): value for key, value in (given or {}).items()}
-    endpoint = found.get("AWS_ENDPOINT_URL")
+            options[name] = value
+    options |= {key.upper(): value for key, value in (given or {}).items()}
+    endpoint = options.get("AWS_ENDPOINT_URL")
     if endpoint is not None:
         # a server of one's own has no regions, but the signature wants one; http in its address says that http is meant
-        found.setdefault("AWS_REGION", "us-east-1")
+        options.setdefault("AWS_REGION", "us-east-1")
         if endpoint.startswith("http://"):
-            found.setdefault("AWS_ALLOW_HTTP", "true")
-    return found
+            options.setdefault("AWS_ALLOW_HTTP", "true")
+    return options
 
 
 def file_system(options: Mapping[str, str]) -> Any:

@@ -108,8 +108,8 @@ class Update:
 
 def update_in(settings: Mapping[str, Any]) -> Update | None:
     """Return what a set of these settings brings forward; None where it stands by itself."""
-    said = settings.get(UPDATES)
-    return None if said is None else Update(**said)
+    update = settings.get(UPDATES)
+    return None if update is None else Update(**update)
 
 
 @dataclass(frozen=True)
@@ -277,16 +277,16 @@ def compare(first: ParameterSet, second: ParameterSet) -> dict[str, dict[str, An
 def differences(first: Sequence[StoredValue], second: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
     """Return how two lists of values differ, by name, see `compare`."""
     here, there = ({p.name: p for p in values} for values in (first, second))
-    found: dict[str, dict[str, Any]] = {}
+    comparison: dict[str, dict[str, Any]] = {}
     for name in dict.fromkeys([*here, *there]):
         p, q = here.get(name), there.get(name)
         difference = q.value - p.value if p is not None and q is not None else None
         spread = hypot(p.std or nan, q.std or nan) if p is not None and q is not None else nan
-        found[name] = {
+        comparison[name] = {
             "first": p.value if p is not None else None,
             "second": q.value if q is not None else None,
             "difference": difference,
             "in_std": difference / spread if difference is not None and spread > 0 else None,
             "unit": (p or q).unit,  # type: ignore[union-attr]
         }
-    return found
+    return comparison

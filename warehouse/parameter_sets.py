@@ -50,20 +50,20 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
         ``parameter_set_differs``: a set with this id is there and says something else; nothing is written.
     """
     given: dict[str, ParameterSet] = {}
-    for one in sets:
-        _refuse_other(given.setdefault(one.parameter_set_id, one), one)
+    for parameter_set in sets:
+        _refuse_other(given.setdefault(parameter_set.parameter_set_id, parameter_set), parameter_set)
     if not given:
         return ()
-    keys = {vessel_key(one.vessel) for one in given.values()}
+    keys = {vessel_key(parameter_set.vessel) for parameter_set in given.values()}
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "parameter_sets") as table:
             # an id is made of logs, and a log is of one vessel: no other vessel's files need be looked into
-            known = delta.rows(table, "parameter_sets", {"vessel_key": sorted(keys), "parameter_set_id": sorted(given)})
-            stored = [_set(r) for r in known.rows(named=True)]
-            for one in stored:
-                _refuse_other(one, given[one.parameter_set_id])
-            fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
+            frame = delta.rows(table, "parameter_sets", {"vessel_key": sorted(keys), "parameter_set_id": sorted(given)})
+            stored = [_set(r) for r in frame.rows(named=True)]
+            for parameter_set in stored:
+                _refuse_other(parameter_set, given[parameter_set.parameter_set_id])
+            fresh = [name for name in given if name not in {parameter_set.parameter_set_id for parameter_set in stored}]
             if fresh:
                 rows = [_as_columns(given[name]) for name in fresh]
                 predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
@@ -72,8 +72,10 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
 
     fresh = with_retry(attempt)
     for name in fresh:
-        one = given[name]
-        _log.info("%s of %s is stored: %s, %s", name, one.vessel, one.model_name, one.estimator)
+        parameter_set = given[name]
+        _log.info(
+            "%s of %s is stored: %s, %s", name, parameter_set.vessel, parameter_set.model_name, parameter_set.estimator
+        )
     return fresh
 
 
@@ -95,14 +97,14 @@ def chain_of(warehouse: Warehouse, name: str, vessel: str | None = None) -> list
     KempfError
         ``set_lost``: one that it rests on is not stored any more.
     """
-    one = as_stored(warehouse, name, vessel)
-    chain, lost = _chain(one, _beside(warehouse, [one]))
+    parameter_set = as_stored(warehouse, name, vessel)
+    chain, lost = _chain(parameter_set, _beside(warehouse, [parameter_set]))
     if lost is not None:
         raise KempfError(
             "set_lost",
-            f"{one.parameter_set_id} brings {lost} forward, which is not in the warehouse any more.",
+            f"{parameter_set.parameter_set_id} brings {lost} forward, which is not in the warehouse any more.",
             "See with `kempf verify` what is damaged; `kempf reprocess` fits all manoeuvres anew.",
-            {"parameter_set_id": one.parameter_set_id, "updates": lost},
+            {"parameter_set_id": parameter_set.parameter_set_id, "updates": lost},
         )
     return chain
 
@@ -115,25 +117,27 @@ def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = N
     """
     sets = all_as_stored(warehouse, vessel, names)
     known = _beside(warehouse, sets)
-    chains = [_chain(one, known) for one in sets]
+    chains = [_chain(parameter_set, known) for parameter_set in sets]
     return [reduce(brought_forward, chain) for chain, lost in chains if lost is None]
 
 
 def _beside(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> dict[str, ParameterSet]:
     """Return sets of one vessel with those that they may rest on, by id."""
-    known = {one.parameter_set_id: one for one in sets}
-    updating = [one for one in sets if one.updates]
+    known = {parameter_set.parameter_set_id: parameter_set for parameter_set in sets}
+    updating = [parameter_set for parameter_set in sets if parameter_set.updates]
     if updating:
-        models, estimators = (sorted({getattr(one, n) for one in updating}) for n in ("model_sha256", "estimator"))
+        models, estimators = (
+            sorted({getattr(parameter_set, n) for parameter_set in updating}) for n in ("model_sha256", "estimator")
+        )
         where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
         for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
             known.setdefault(row["parameter_set_id"], _set(row))
     return known
 
 
-def _chain(one: ParameterSet, known: Mapping[str, ParameterSet]) -> tuple[list[ParameterSet], str | None]:
+def _chain(parameter_set: ParameterSet, known: Mapping[str, ParameterSet]) -> tuple[list[ParameterSet], str | None]:
     """Return a set behind those that it brings forward, the first one in front, and which of these is lost."""
-    chain = [one]
+    chain = [parameter_set]
     while (update := chain[0].updates) is not None:
         if update.set not in known:
             return chain, update.set
@@ -173,8 +177,8 @@ def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str)
     where: Where = {"vessel_key": vessel_key(vessel), "model_sha256": model_sha256, "estimator": estimator}
     columns = ("parameter_set_id", "segment_ids", "settings_json", "provenance_json")
     frame = delta.read(warehouse, "parameter_sets", where, columns).sort("parameter_set_id")
-    said = frame["provenance_json"].str
-    codes, profiles = (said.json_path_match(f"$.{key}").to_list() for key in ("code_version", "profile_sha256"))
+    provenance = frame["provenance_json"].str
+    codes, profiles = (provenance.json_path_match(f"$.{key}").to_list() for key in ("code_version", "profile_sha256"))
     return [
         Pooled(name, tuple(ids), loads(settings), code, profile)
         for (name, ids, settings, _), code, profile in zip(frame.rows(), codes, profiles, strict=True)
@@ -201,22 +205,22 @@ def as_stored(warehouse: Warehouse, name: str, vessel: str | None = None) -> Par
     if found_whole.height:
         return _set(found_whole.rows(named=True)[0])
     ids = delta.read(warehouse, "parameter_sets", hers, ("parameter_set_id",))["parameter_set_id"].to_list()
-    found = sorted(one for one in ids if one.startswith(name))
-    if not name.strip() or not found:
+    names = sorted(candidate for candidate in ids if candidate.startswith(name))
+    if not name.strip() or not names:
         raise NotFound(
             "no_parameter_set",
             f"There is no parameter set {name!r} in {warehouse.uri}.",
             "List them with `kempf params list`, or make one with `kempf identify --vessel NAME`.",
             {"parameter_set_id": name},
         )
-    if len(found) > 1:
+    if len(names) > 1:
         raise UsageError(
             "ambiguous_parameter_set",
-            f"{len(found)} parameter sets begin with {name!r}: {', '.join(found[:5])}{' ...' if found[5:] else ''}.",
+            f"{len(names)} parameter sets begin with {name!r}: {', '.join(names[:5])}{' ...' if names[5:] else ''}.",
             "Give more of the id.",
-            {"beginning": name, "found": found},
+            {"beginning": name, "found": names},
         )
-    return as_stored(warehouse, found[0], vessel)
+    return as_stored(warehouse, names[0], vessel)
 
 
 def all_as_stored(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
@@ -309,14 +313,14 @@ def convergences(
     columns = ("parameter_set_id", "model_name", "estimator", "segment_ids", "convergence_json", "provenance_json")
     with delta.lent(warehouse, "parameter_sets", where) as lazy:
         by = pl.col("provenance_json").str.json_path_match("$.code_version")
-        said = pl.col("convergence_json").str
+        convergence = pl.col("convergence_json").str
         frame = (
             (lazy if code is None else lazy.filter(by == code))
             .select(
                 *columns[:4],
-                said.json_path_match("$.converged") == "true",
-                left=said.json_path_match("$.left_out"),
-                pooling=said.json_path_match("$.pooling"),
+                convergence.json_path_match("$.converged") == "true",
+                left=convergence.json_path_match("$.left_out"),
+                pooling=convergence.json_path_match("$.pooling"),
             )
             .collect()
         )
@@ -335,8 +339,8 @@ def codes(warehouse: Warehouse, vessel: str) -> set[str]:
 def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:
     if stored is given or content_digest(stored) == content_digest(given):
         return
-    found = differences(stored, given)
-    fields = [one.field for one in found]
+    disagreements = differences(stored, given)
+    fields = [difference.field for difference in disagreements]
     packages = [dict(s.provenance.get("packages") or {}) for s in (stored, given)]
     changed = sorted(n for n in packages[0].keys() | packages[1].keys() if packages[0].get(n) != packages[1].get(n))
     raise KempfError(
@@ -345,12 +349,12 @@ def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:
         f"{', '.join(fields[:6])}{', ...' if fields[6:] else ''}"
         + (f"; other versions of {', '.join(changed)}." if changed else "."),
         f"See how far they differ with `kempf rerun {stored.parameter_set_id}`; the stored set stays as it is.",
-        {"differences": [one.as_json() for one in found], "packages": changed},
+        {"differences": [difference.as_json() for difference in disagreements], "packages": changed},
     )
 
 
-def _as_columns(one: ParameterSet) -> dict[str, Any]:
-    columns = {**vars(one), "vessel_key": vessel_key(one.vessel)}
+def _as_columns(parameter_set: ParameterSet) -> dict[str, Any]:
+    columns = {**vars(parameter_set), "vessel_key": vessel_key(parameter_set.vessel)}
     columns |= {name: [vars(estimate) for estimate in columns[name]] for name in _ESTIMATES}
     texts = {f"{name}_json": canonical_json(columns.pop(name)) for name in _TEXTS}
     return {**columns, **texts, "model_json": canonical_json(columns.pop("model_spec"))}
@@ -369,7 +373,7 @@ def stored_at_ms(warehouse: Warehouse) -> dict[str, int]:
 
     The files of all commits are kept, see `kempf.warehouse.compaction.ALWAYS`; a set whose file is damaged has no time.
     """
-    found: dict[str, int] = {}
+    instants: dict[str, int] = {}
     with delta.reading(warehouse, "parameter_sets") as table:
         times = delta.commit_times(table) if table is not None else []
     for version, milliseconds in enumerate(times):
@@ -377,8 +381,8 @@ def stored_at_ms(warehouse: Warehouse) -> dict[str, int]:
         for path in seals.added(commit):
             for name in _ids_in(warehouse, path):
                 # compaction brings it again
-                found.setdefault(name, milliseconds)
-    return found
+                instants.setdefault(name, milliseconds)
+    return instants
 
 
 def _ids_in(warehouse: Warehouse, path: str) -> list[str]:

@@ -58,10 +58,10 @@ def collect(
         "code_version": inputs.code_version,
         "made_by": code_version.fingerprint("estimate"),
         "git_commit": code_version.git_commit(),
-        "packages": {name: found for name, found in installed.items() if name != "python"},
+        "packages": {name: version for name, version in installed.items() if name != "python"},
         "python": installed["python"],
         "machine": code_version.machine(),
         "table_versions": dict(sorted(table_versions.items())),
         "flow_run": flow_run,
-        "channels": {one.log_id: list(one.findings) for one in seen if one.findings},
+        "channels": {examination.log_id: list(examination.findings) for examination in seen if examination.findings},
     }

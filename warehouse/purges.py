@@ -35,9 +35,9 @@ class Purge:
         return asdict(self)
 
 
-def add(warehouse: Warehouse, one: Purge) -> None:
+def add(warehouse: Warehouse, purge: Purge) -> None:
     """Write a receipt."""
-    said.add(warehouse, _TABLE, {**asdict(one), "vessel_key": vessel_key(one.vessel)})
+    said.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
 
 
 def of_logs(warehouse: Warehouse, log_ids: Collection[str] | None = None) -> dict[str, Purge]:
@@ -57,10 +57,10 @@ def refuse(warehouse: Warehouse, log_ids: Collection[str]) -> None:
     DataRejected
         ``log_purged``.
     """
-    for one in of_logs(warehouse, log_ids).values():
+    for purge in of_logs(warehouse, log_ids).values():
         raise DataRejected(
             "log_purged",
-            f"The log {one.file_name} of {one.vessel!r} was purged ({one.reason}): it is not to be kept here.",
+            f"The log {purge.file_name} of {purge.vessel!r} was purged ({purge.reason}): it is not to be kept here.",
             "Take the file away from where it is delivered. What was purged cannot be brought back.",
-            {"log_id": one.log_id, "vessel": one.vessel},
+            {"log_id": purge.log_id, "vessel": purge.vessel},
         )

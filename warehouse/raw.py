@@ -52,16 +52,16 @@ def put(warehouse: Warehouse, log: LogFile) -> str:
 
 def _unchanged(log: LogFile) -> Iterator[bytes]:
     """Yield the bytes of a log, and fail at their end where they are no longer those that it is known by."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for piece in log.pieces():
-        found.update(piece)
+        digest.update(piece)
         yield piece
-    if found.hexdigest() != log.sha256:
+    if digest.hexdigest() != log.sha256:
         raise DataRejected(
             "log_changed",
-            f"The log changed while it was read: its hash was {log.sha256}, and is {found.hexdigest()}.",
+            f"The log changed while it was read: its hash was {log.sha256}, and is {digest.hexdigest()}.",
             "Wait until nothing writes to it any more, or copy it; then ingest it again.",
-            {"before": log.sha256, "after": found.hexdigest()},
+            {"before": log.sha256, "after": digest.hexdigest()},
         )
 
 

@@ -98,8 +98,8 @@ def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     NotFound
         ``no_warehouse``, ``no_ingest``.
     """
-    found = delta.read(warehouse, "rejected", _of_ingest(warehouse, ingest_id))
-    return found.select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
+    frame = delta.read(warehouse, "rejected", _of_ingest(warehouse, ingest_id))
+    return frame.select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
 
 
 def _of_ingest(warehouse: Warehouse, ingest_id: str) -> dict[str, str]:

@@ -46,14 +46,14 @@ def remembered(warehouse: Warehouse, tables: Sequence[str], question: Hashable, 
         if held is not None and held[0] == versions:
             _kept[key] = held  # the newest last
             return held[1]  # type: ignore[return-value]
-    made = make()
+    result = make()
     # read between two versions it is of neither
     if versions == tuple(_version(warehouse, name) for name in tables):
         with _lock:
-            _kept[key] = versions, made
+            _kept[key] = versions, result
             while len(_kept) > _MOST:
                 del _kept[next(iter(_kept))]
-    return made
+    return result
 
 
 def _version(warehouse: Warehouse, name: str) -> tuple[int, object] | None:

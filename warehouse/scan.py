@@ -42,8 +42,8 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     """
     import polars as pl
 
-    asked = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
-    single = {column: value for column, value in asked.items() if isinstance(value, str)}
+    question = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
+    single = {column: value for column, value in question.items() if isinstance(value, str)}
     empty = _empty(name)
     if table is None:
         lazy = empty.lazy()
@@ -53,11 +53,11 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     else:
         folder = seals.folder_of(table)
         if folder is not None:
-            seals.compare_files(folder, name, _candidates(table, asked))
+            seals.compare_files(folder, name, _candidates(table, question))
         held = {field.name for field in table.schema().fields}
         absent = {column: kind for column, kind in empty.schema.items() if column not in held}
         lazy = pl.scan_delta(table).with_columns(pl.lit(None, dtype=kind).alias(c) for c, kind in absent.items())
-    for column, value in asked.items():
+    for column, value in question.items():
         lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
     return lazy
 
@@ -107,23 +107,23 @@ def _of_files(
     return lazy.with_columns(pl.lit(single[column]).alias(column) for column in folders).select(empty.columns)
 
 
-def _candidates(table: DeltaTable, asked: Mapping[str, str | list[str]]) -> list[str]:
+def _candidates(table: DeltaTable, question: Mapping[str, str | list[str]]) -> list[str]:
     """Return the files of the folders that a question concerns."""
     folders = set(table.metadata().partition_columns)
-    filters = [(c, "in", [v] if isinstance(v, str) else list(v)) for c, v in asked.items() if c in folders and v]
+    filters = [(c, "in", [v] if isinstance(v, str) else list(v)) for c, v in question.items() if c in folders and v]
     return table.file_uris(file_pruning_predicate=filters) if filters else table.file_uris()
 
 
 def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:
     """Return the files that may hold these values; what was asked before of this version is not looked for again."""
-    version, known = vars(table).get(_ASKED, (None, {}))
+    version, answers = vars(table).get(_ASKED, (None, {}))
     if version != table.version():
-        version, known = vars(table)[_ASKED] = table.version(), {}
-    asked = tuple(sorted(single.items()))
-    if asked not in known:
-        known[asked] = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in asked])
-    found: list[str] = known[asked]
-    return found
+        version, answers = vars(table)[_ASKED] = table.version(), {}
+    question = tuple(sorted(single.items()))
+    if question not in answers:
+        answers[question] = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in question])
+    files: list[str] = answers[question]
+    return files
 
 
 def _empty(name: str) -> pl.DataFrame:

@@ -199,14 +199,14 @@ def _is_whole(commit: bytes) -> bool:
     except ValueError:
         return False
     # what the writer says of itself stands first, so that a commit that was cut off still has it
-    said = next((action["commitInfo"] for action in actions if "commitInfo" in action), None)
-    if said is None or commit.endswith(b"\n"):
+    info = next((action["commitInfo"] for action in actions if "commitInfo" in action), None)
+    if info is None or commit.endswith(b"\n"):
         return False
-    if said.get("operation") == "CREATE TABLE":
+    if info.get("operation") == "CREATE TABLE":
         return any("metaData" in action for action in actions)
-    metrics = said.get("operationMetrics") or {}
+    metrics = info.get("operationMetrics") or {}
     expected = {"add": metrics.get("num_added_files"), "remove": metrics.get("num_removed_files")}
-    return all(count is None or sum(what in a for a in actions) == int(count) for what, count in expected.items())
+    return all(count is None or sum(kind in a for a in actions) == int(count) for kind, count in expected.items())
 
 
 def copy_of_commit(folder: Path, version: int) -> bytes | None:
@@ -251,7 +251,7 @@ def damage_of_file(folder: Path, name: str, path: Path) -> Damage | None:
     mark = _file_seal(folder, path.name)
     try:
         sealed = _sealed_hash(mark)
-        found = _known_hash(path)
+        digest = _known_hash(path)
     except FileNotFoundError:
         if path.exists():
             return None
@@ -260,7 +260,7 @@ def damage_of_file(folder: Path, name: str, path: Path) -> Damage | None:
         return Damage(name, "data file", shown, f"it cannot be read: {error.strerror or error}")
     if sealed is None:
         return Damage(name, "seal", f"{name}/{FOLDER}/data/{mark.name}", "it is no whole seal")
-    return None if sealed == found else Damage(name, "data file", shown, "its bytes are others than were written")
+    return None if sealed == digest else Damage(name, "data file", shown, "its bytes are others than were written")
 
 
 #: Hashes by path and what the system says of the file, so that a process computes each once.
@@ -273,14 +273,14 @@ def _known_hash(path: Path) -> str:
     at = path.stat()
     key = (str(path), at.st_ino, at.st_mtime_ns, at.st_size)
     with _lock:
-        found = _known.get(key)
-    if found is None:
-        found = _hash(path)
+        digest = _known.get(key)
+    if digest is None:
+        digest = _hash(path)
         with _lock:
             if len(_known) >= _MOST_KNOWN:
                 _known.clear()
-            _known[key] = found
-    return found
+            _known[key] = digest
+    return digest
 
 
 def _hash(path: Path) -> str:
@@ -336,18 +336,18 @@ def mend_log(folder: Path, name: str) -> list[str]:
     list of str
         What was done, a sentence each.
     """
-    done = []
+    sentences = []
     newest = max(sealed_versions(folder), default=-1)
     for path in sorted((folder / "_delta_log").glob("*.checkpoint.parquet")):
         damage = damage_of_file(folder, name, path)
         if damage is not None and damage.what == "seal":
-            done += mend_seals(folder, name, [path])
+            sentences += mend_seals(folder, name, [path])
         elif damage is not None:
             # the commits are all kept: the table opens without it
             path.unlink(missing_ok=True)
             (folder / "_delta_log" / "_last_checkpoint").unlink(missing_ok=True)
             _file_seal(folder, path.name).unlink(missing_ok=True)
-            done.append(f"The checkpoint {name}/_delta_log/{path.name} was taken away; the commits say the same.")
+            sentences.append(f"The checkpoint {name}/_delta_log/{path.name} was taken away; the commits say the same.")
     for version in range(newest + 1):
         for damage in list(_damage_of_commit(folder, name, version)):
             copy = copy_of_commit(folder, version)
@@ -355,28 +355,28 @@ def mend_log(folder: Path, name: str) -> list[str]:
                 _log_seal(folder, version).unlink()
                 with suppress(FileNotFoundError):
                     _seal_version(folder, version)
-                done.append(f"The seal {damage.path} was made anew.")
+                sentences.append(f"The seal {damage.path} was made anew.")
             elif copy is not None:
                 _commit(folder, version).parent.mkdir(parents=True, exist_ok=True)
                 _write(_commit(folder, version), copy)
-                done.append(f"The commit {damage.path} was put back from its sealed copy.")
+                sentences.append(f"The commit {damage.path} was put back from its sealed copy.")
     for damage in list(torn_commits(folder, name)):
         path = folder / "_delta_log" / Path(damage.path).name
         path.unlink()
-        done.append(f"The commit {damage.path} was taken away: {damage.why}, and never counted.")
-    return done
+        sentences.append(f"The commit {damage.path} was taken away: {damage.why}, and never counted.")
+    return sentences
 
 
 def mend_seals(folder: Path, name: str, paths: Iterable[Path]) -> list[str]:
     """Seal anew the files of a table whose seals are no whole ones."""
-    done = []
+    sentences = []
     for path in paths:
         damage = damage_of_file(folder, name, path)
         if damage is not None and damage.what == "seal":
             _file_seal(folder, path.name).unlink()
             _seal_file(folder, path)
-            done.append(f"The seal {damage.path} was made anew.")
-    return done
+            sentences.append(f"The seal {damage.path} was made anew.")
+    return sentences
 
 
 def forget(folder: Path, path: Path) -> None:

@@ -119,14 +119,14 @@ class Segment:
         return result
 
 
-def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segment]]) -> tuple[str, ...]:
+def replace(warehouse: Warehouse, manoeuvres: Mapping[tuple[str, str], Sequence[Segment]]) -> tuple[str, ...]:
     """Put what was found in some ingests, of any vessels, in place of what is stored of them, in at most one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    found : mapping of (str, str) to sequence of Segment
+    manoeuvres : mapping of (str, str) to sequence of Segment
         By vessel and ingest id; an empty sequence says that nothing was found.
 
     Returns
@@ -139,12 +139,12 @@ def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segme
     ValueError
         A segment names another vessel or ingest than it is given for.
     """
-    keys = {vessel: vessel_key(vessel) for vessel, _ in found}
-    for (vessel, ingest), segments in found.items():
+    keys = {vessel: vessel_key(vessel) for vessel, _ in manoeuvres}
+    for (vessel, ingest), segments in manoeuvres.items():
         for segment in segments:
             if (segment.vessel, segment.ingest_id) != (vessel, ingest):
                 raise ValueError(f"{segment.segment_id} is of {segment.vessel!r}, {segment.ingest_id}: not {ingest}")
-    of_ingest = {ingest: (keys[vessel], segments) for (vessel, ingest), segments in found.items()}
+    of_ingest = {ingest: (keys[vessel], segments) for (vessel, ingest), segments in manoeuvres.items()}
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "segments") as table:
@@ -164,7 +164,7 @@ def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segme
                 delta.replace(table, "segments", rows, predicate)
             return changed
 
-    return with_retry(attempt) if found else ()
+    return with_retry(attempt) if manoeuvres else ()
 
 
 def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
@@ -244,7 +244,9 @@ def by_ids(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict[st
         ``no_warehouse``.
     """
     frame = delta.read(warehouse, "segments", {"vessel_key": vessel_key(vessel), "segment_id": sorted(set(names))})
-    return {one.segment_id: one for one in map(_segment, frame.sort("segment_id", "ingest_id").rows(named=True))}
+    return {
+        segment.segment_id: segment for segment in map(_segment, frame.sort("segment_id", "ingest_id").rows(named=True))
+    }
 
 
 def get(warehouse: Warehouse, name: str) -> Segment:
@@ -255,10 +257,10 @@ def get(warehouse: Warehouse, name: str) -> Segment:
     NotFound
         ``no_warehouse``, ``no_segment``.
     """
-    found = [segment for segment in found_in(warehouse) if segment.segment_id == name]
-    if not found:
+    segments = [segment for segment in found_in(warehouse) if segment.segment_id == name]
+    if not segments:
         raise _no_segment(warehouse, name)
-    return found[0]
+    return segments[0]
 
 
 def by_prefix(warehouse: Warehouse, name: str) -> Segment:
@@ -273,19 +275,21 @@ def by_prefix(warehouse: Warehouse, name: str) -> Segment:
     """
     ids = delta.read(warehouse, "segments", columns=("segment_id", "vessel"))
     whose = ids.filter(ids["segment_id"].str.starts_with(name))["vessel"].unique().sort().to_list() if name else []
-    known = {one.vessel for one in logs.current(warehouse)} if whose else set()
-    every = [one for vessel in whose if vessel in known for one in found_in(warehouse, vessel)]
-    found = [one for one in every if one.segment_id == name] or [s for s in every if s.segment_id.startswith(name)]
-    if not found:
+    known = {row.vessel for row in logs.current(warehouse)} if whose else set()
+    every = [segment for vessel in whose if vessel in known for segment in found_in(warehouse, vessel)]
+    segments = [segment for segment in every if segment.segment_id == name] or [
+        segment for segment in every if segment.segment_id.startswith(name)
+    ]
+    if not segments:
         raise _no_segment(warehouse, name)
-    if len(found) > 1:
+    if len(segments) > 1:
         raise UsageError(
             "ambiguous_segment",
-            f"{len(found)} segments fit {name!r}: {', '.join(one.segment_id for one in found[:5])}.",
+            f"{len(segments)} segments fit {name!r}: {', '.join(segment.segment_id for segment in segments[:5])}.",
             "Give more of the id.",
-            {"segment_id": name, "found": [one.segment_id for one in found]},
+            {"segment_id": name, "found": [segment.segment_id for segment in segments]},
         )
-    return found[0]
+    return segments[0]
 
 
 def _no_segment(warehouse: Warehouse, name: str) -> NotFound:

@@ -81,7 +81,7 @@ class SourceFolder:
             options = object_store.options_of(self.storage_options)
             if scheme in object_store.SCHEMES and options:
                 return object_store.file_system(options), inside
-            found, root = fs.FileSystem.from_uri(self.address)
+            files, root = fs.FileSystem.from_uri(self.address)
         except (ValueError, OSError) as error:  # pyarrow's own errors are subclasses
             raise UsageError(
                 "inbox_path",
@@ -89,7 +89,7 @@ class SourceFolder:
                 "Give a folder, or s3://bucket/prefix.",
                 {"uri": self.uri},
             ) from error
-        return found, str(root)
+        return files, str(root)
 
     def list(self) -> list[SourceFile]:
         """Return its files, those in folders below it too, sorted by path; hidden ones are left out.
@@ -122,7 +122,7 @@ class SourceFolder:
                     "Check the address; an inbox is a folder, or s3://bucket/prefix, with one folder a vessel.",
                     {"uri": self.uri},
                 )
-            found = files.get_file_info(fs.FileSelector(root, recursive=True))
+            listing = files.get_file_info(fs.FileSelector(root, recursive=True))
         except OSError as error:
             raise KempfError(
                 "inbox_unreadable",
@@ -131,7 +131,7 @@ class SourceFolder:
                 {"uri": self.uri},
             ) from error
         listed = []
-        for info in found:
+        for info in listing:
             path = info.path[len(root) :].lstrip("/")
             if info.type != fs.FileType.File or any(part.startswith(".") for part in path.split("/")):
                 continue

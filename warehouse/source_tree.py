@@ -70,8 +70,8 @@ def _is_remark(node: Any) -> bool:
 
 def _imported(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
-        for other in node.orelse:
-            yield from _imported(other)
+        for statement in node.orelse:
+            yield from _imported(statement)
         return
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
@@ -128,23 +128,23 @@ class SourceTree:
         for name in todo:
             if name not in self._files:
                 raise ModuleNotFoundError(f"there is no module {name} in {self._folder}", name=name)
-        found: dict[str, str] = {}
+        digests: dict[str, str] = {}
         while todo:
             name = todo.pop()
-            if name in found or name not in self._files:
+            if name in digests or name not in self._files:
                 continue
             path = self._files[name]
             module = self._known.module(path.read_bytes())
-            found[name] = module.digest
+            digests[name] = module.digest
             package = name if path.stem == "__init__" else name.rpartition(".")[0]
-            todo += [name.rpartition(".")[0], *(resolve_name(one, package) for one in module.imports)]
+            todo += [name.rpartition(".")[0], *(resolve_name(entry, package) for entry in module.imports)]
             if module.by_name:
                 beside = [p for p in sorted(path.parent.rglob("*")) if p.is_file() and p.parent.name != "__pycache__"]
                 todo += [_name(p, self._folder) for p in beside if p.suffix == ".py"]
                 data = [p for p in beside if p.suffix != ".py"]
-                found |= {p.relative_to(self._folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in data}
+                digests |= {p.relative_to(self._folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in data}
         self._known.keep()
-        return found
+        return digests
 
 
 def _name(path: Path, folder: Path) -> str:
@@ -170,9 +170,9 @@ class _Kept:
         with suppress(KeyError, ValueError, TypeError):
             digest, imports, by_name = self._modules[key]
             return Module(str(digest), tuple(imports), bool(by_name))
-        made = read_module(content)
-        self._new[key] = [made.digest, made.imports, made.by_name]
-        return made
+        module = read_module(content)
+        self._new[key] = [module.digest, module.imports, module.by_name]
+        return module
 
     def keep(self) -> None:
         """Write down what is new, at the first place that can be written to; nowhere is no harm."""

@@ -138,10 +138,10 @@ class Warehouse:
         with stream:
             yield stream
 
-    def _unreachable(self, what: str, why: object) -> KempfError:
+    def _unreachable(self, path: str, why: object) -> KempfError:
         return KempfError(
             "warehouse_unreachable",
-            f"Reading {what} of the warehouse {self.uri} failed: {why}.",
+            f"Reading {path} of the warehouse {self.uri} failed: {why}.",
             "Look at the permissions of the folder, or at the address and the credentials of the object store.",
         )
 
@@ -156,7 +156,7 @@ class Warehouse:
         files, root = self._files
         top = "/".join((root, *parts))
         where = fs.FileSelector(top, recursive=True, allow_not_found=True)
-        return sorted(one.path.removeprefix(f"{top}/") for one in files.get_file_info(where) if one.is_file)
+        return sorted(info.path.removeprefix(f"{top}/") for info in files.get_file_info(where) if info.is_file)
 
     def size_of(self, *parts: str) -> int | None:
         """Return the size of a file inside, bytes; None where there is none."""
@@ -168,10 +168,10 @@ class Warehouse:
         """Return numbers that change where a file inside is replaced by another; None where there is none."""
         if self.folder is not None:
             try:
-                found = self.folder.joinpath(*parts).stat()
+                status = self.folder.joinpath(*parts).stat()
             except OSError:
                 return None
-            return found.st_ino, found.st_mtime_ns, found.st_size
+            return status.st_ino, status.st_mtime_ns, status.st_size
         files, root = self._files
         info = files.get_file_info("/".join((root, *parts)))
         return None if info.mtime_ns is None else (info.mtime_ns, info.size or 0)
@@ -227,36 +227,36 @@ class Warehouse:
         """
         if self.folder is None and vars(self).get("_stood"):
             return True  # a bucket is asked once; a folder may be moved away while we look
-        found = self.marker()
-        if found is None:
+        marker = self.marker()
+        if marker is None:
             return False
-        self._refuse_other_layout(found)
+        self._refuse_other_layout(marker)
         vars(self)["_stood"] = True
         return True
 
-    def _refuse_other_layout(self, found: Marker) -> None:
-        layouts = {"found": found.layout, "expected": LAYOUT}
-        if found.layout > LAYOUT:
+    def _refuse_other_layout(self, marker: Marker) -> None:
+        layouts = {"found": marker.layout, "expected": LAYOUT}
+        if marker.layout > LAYOUT:
             raise KempfError(
                 "warehouse_layout",
-                f"The warehouse {self.uri} has layout {found.layout}; this version reads layout {LAYOUT}.",
+                f"The warehouse {self.uri} has layout {marker.layout}; this version reads layout {LAYOUT}.",
                 "Update kempf, or give another folder with --warehouse.",
                 layouts,
             )
         if self.migrating:
             return
-        if found.migrating is not None:
+        if marker.migrating is not None:
             raise KempfError(
                 "warehouse_migrating",
-                f"The warehouse {self.uri} is being brought from layout {found.migrating} to layout {found.layout}, "
+                f"The warehouse {self.uri} is being brought from layout {marker.migrating} to layout {marker.layout}, "
                 "which is not finished.",
                 "Wait where it is going on; `kempf migrate` finishes one that was interrupted.",
-                {**layouts, "from": found.migrating},
+                {**layouts, "from": marker.migrating},
             )
-        if found.layout < LAYOUT:
+        if marker.layout < LAYOUT:
             raise KempfError(
                 "warehouse_layout_old",
-                f"The warehouse {self.uri} has layout {found.layout}; this version works with layout {LAYOUT}.",
+                f"The warehouse {self.uri} has layout {marker.layout}; this version works with layout {LAYOUT}.",
                 "`kempf migrate` brings it forward; nothing is lost.",
                 layouts,
             )
@@ -270,14 +270,14 @@ class Warehouse:
             ``warehouse_marker_damaged``.
         """
         data = self.read_bytes(MARKER)
-        found = None if data is None else markers.read(data)
-        if data is not None and found is None:
+        marker = None if data is None else markers.read(data)
+        if data is not None and marker is None:
             raise KempfError(
                 "warehouse_marker_damaged",
                 f"The file {MARKER} of the warehouse {self.uri} is damaged.",
                 "`kempf repair` writes it anew.",
             )
-        return found
+        return marker
 
     def mark(self, marker: Marker) -> None:
         """Write what marks the warehouse; raises what `write` raises."""
@@ -336,10 +336,10 @@ class Warehouse:
             )
             taken = self.folder.exists() and not self.folder.is_dir()
             if (others or taken) and not self.exists():  # another process may have made it meanwhile
-                found = f"other files, such as {others[0]!r}" if others else "a file"
+                content = f"other files, such as {others[0]!r}" if others else "a file"
                 raise UsageError(
                     "not_a_warehouse",
-                    f"{self.uri} is no warehouse: found {found}; expected a warehouse or an empty folder.",
+                    f"{self.uri} is no warehouse: found {content}; expected a warehouse or an empty folder.",
                     "Give another folder with --warehouse.",
                     {"uri": self.uri},
                 )

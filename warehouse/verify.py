@@ -61,12 +61,12 @@ def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem
         ``no_warehouse``.
     """
     warehouse.require()
-    found = [*_raw(warehouse, look)]
+    problems = [*_raw(warehouse, look)]
     for name in TABLES:
         look(f"table {name}")
-        found += damages(warehouse, name)
+        problems += damages(warehouse, name)
     look("references")
-    return [*found, *unfinished(warehouse), *_references(warehouse)]
+    return [*problems, *unfinished(warehouse), *_references(warehouse)]
 
 
 def unfinished(warehouse: Warehouse) -> Iterator[Problem]:
@@ -91,21 +91,21 @@ def damages(warehouse: Warehouse, name: str) -> list[Problem]:
         lost = seals.sealed_versions(folder)
         return [Problem("table", name, name, f"The table {name} is gone.")] if lost else []
     newest = max(seals.sealed_versions(folder), default=-1)
-    found = [_problem(one) for one in seals.damages_of_log(folder, name, newest)]
-    found += [_problem(one) for one in seals.torn_commits(folder, name)]
-    if any(one.where.startswith(f"{name}/_delta_log/") for one in found):
-        return found  # which files count is not known before the log is whole
+    problems = [_problem(damage) for damage in seals.damages_of_log(folder, name, newest)]
+    problems += [_problem(damage) for damage in seals.torn_commits(folder, name)]
+    if any(problem.where.startswith(f"{name}/_delta_log/") for problem in problems):
+        return problems  # which files count is not known before the log is whole
     opened = _opened(warehouse, name)
     if isinstance(opened, Problem):
-        return [*found, opened]
+        return [*problems, opened]
     live = {Path(path) for path in opened}
     for path in sorted(live | set(folder.rglob("*.parquet"))):
         if folder / "_delta_log" in path.parents or (path not in live and not path.exists()):
             continue
         damage = seals.damage_of_file(folder, name, path)
         if damage is not None:
-            found.append(_problem(damage, past=path not in live and damage.what != "seal"))
-    return found if any(not one.past for one in found) else [*found, *_readable(warehouse, name)]
+            problems.append(_problem(damage, past=path not in live and damage.what != "seal"))
+    return problems if any(not problem.past for problem in problems) else [*problems, *_readable(warehouse, name)]
 
 
 def _opened(warehouse: Warehouse, name: str) -> list[str] | Problem:
@@ -177,7 +177,7 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
 
 def _half_purged(warehouse: Warehouse, kept: set[str], ingests: dict[str, str]) -> Iterator[Problem]:
     """Yield the logs that were to be deleted for good and of which something is still there."""
-    there = {ingests[one] for one in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
+    there = {ingests[ingest] for ingest in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
     for log_id in sorted(kept | there):
         words = f"Of the purged log {log_id} something is still there: `kempf purge {log_id[:12]}` goes on."
         yield Problem("reference", "purges", log_id, words)
@@ -187,7 +187,7 @@ def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:
     """Yield the raw logs beside which something else is kept than the registers say."""
     try:
         known = logs.find(warehouse, raw.kept(warehouse))
-        profiles = {one.profile_sha256: one.profile for one in vessels.all_versions(warehouse)}
+        profiles = {version.profile_sha256: version.profile for version in vessels.all_versions(warehouse)}
     except Exception:  # noqa: BLE001 - it is reported as damaged already
         return
     for log_id, row in sorted(known.items()):
@@ -198,23 +198,23 @@ def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:
 
 
 def _of_sets(warehouse: Warehouse, log_ids: set[str], set_ids: set[str]) -> Iterator[Problem]:
-    for name, column, what, there in (
+    for name, column, kind, there in (
         ("parameter_sets", "log_ids", "log", log_ids),
         ("aliases", "parameter_set_id", "parameter set", set_ids),
         ("diagnoses", "parameter_set_id", "parameter set", set_ids),
     ):
         for value in sorted(_values_of(warehouse, name, column) - there):
-            yield Problem("reference", name, value, f"The {what} {value} that {name} refer to is lost.")
+            yield Problem("reference", name, value, f"The {kind} {value} that {name} refer to is lost.")
 
 
 def _values_of(warehouse: Warehouse, name: str, column: str) -> set[str]:
     """Return the values of a column, those of lists one by one; none of a table that cannot be read."""
     try:
-        found = delta.read(warehouse, name, columns=(column,))[column]
+        series = delta.read(warehouse, name, columns=(column,))[column]
     except Exception:  # noqa: BLE001 - it is reported as damaged already
         return set()
-    values: Iterable[Any] = found.explode() if found.dtype.is_nested() else found
-    return {str(one) for one in values if one is not None}
+    values: Iterable[Any] = series.explode() if series.dtype.is_nested() else series
+    return {str(value) for value in values if value is not None}
 
 
 def _ingests_of(warehouse: Warehouse, name: str) -> set[str] | None:

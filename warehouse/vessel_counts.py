@@ -23,9 +23,9 @@ def vessel_counts(warehouse: Warehouse) -> list[dict[str, Any]]:
     rows = logs.current(warehouse)
     held = Counter(row.vessel for row in rows)
     every = segments.of_ingests(warehouse, [row.ingest_id for row in rows])
-    found = Counter(one.vessel for one in every if one.is_fitted and one.excluded is None)
+    manoeuvres = Counter(segment.vessel for segment in every if segment.is_fitted and segment.excluded is None)
     sets = Counter(parameter_sets.summaries(warehouse)["vessel"].to_list())
     return [
-        {"vessel": name, "logs": held[name], "segments": found[name], "parameter_sets": sets[name]}
+        {"vessel": name, "logs": held[name], "segments": manoeuvres[name], "parameter_sets": sets[name]}
         for name in vessels.names(warehouse)
     ]

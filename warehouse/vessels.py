@@ -109,10 +109,10 @@ def remove(warehouse: Warehouse, vessel: str, reason: str) -> bool:
 
     def attempt() -> bool:
         with delta.ensured(warehouse, "vessels") as table:
-            known = delta.rows(table, "vessels", {"vessel_key": key}).sort("revision").rows(named=True)
-            if not known or known[-1]["removed"] is not None:
+            rows = delta.rows(table, "vessels", {"vessel_key": key}).sort("revision").rows(named=True)
+            if not rows or rows[-1]["removed"] is not None:
                 return False
-            row = {**known[-1], "revision": known[-1]["revision"] + 1, "removed": reason}
+            row = {**rows[-1], "revision": rows[-1]["revision"] + 1, "removed": reason}
             delta.replace(table, "vessels", [row], f"vessel_key = {quoted(key)} AND revision = {row['revision']}")
             return True
 
@@ -206,15 +206,15 @@ def get(warehouse: Warehouse, profile_sha256: str) -> VesselProfile:
     NotFound
         ``no_warehouse``, ``no_profile``.
     """
-    found = delta.read(warehouse, "vessels", {"profile_sha256": profile_sha256})
-    if found.height == 0:
+    frame = delta.read(warehouse, "vessels", {"profile_sha256": profile_sha256})
+    if frame.height == 0:
         raise NotFound(
             "no_profile",
             f"No vessel has a profile with the hash {profile_sha256!r}.",
             "List the profiles with `kempf vessels show NAME`.",
             {"profile_sha256": profile_sha256},
         )
-    return _version(found.sort("vessel", "revision").row(0, named=True)).profile
+    return _version(frame.sort("vessel", "revision").row(0, named=True)).profile
 
 
 def _version(row: Mapping[str, Any]) -> VesselVersion:

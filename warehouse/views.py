@@ -27,8 +27,8 @@ def parameter_history(warehouse: Warehouse) -> pl.DataFrame:
     schema: dict[str, Any] = {"vessel": pl.String, **_PARAMETER}
     stored = parameter_sets.stored_at_ms(warehouse) if names else {}
     frames = [_of_vessel(warehouse, name, stored) for name in names]
-    found = pl.concat([pl.DataFrame(schema=schema), *frames]) if frames else pl.DataFrame(schema=schema)
-    return found.sort("vessel", "start_at", "parameter_set_id", "parameter")
+    frame = pl.concat([pl.DataFrame(schema=schema), *frames]) if frames else pl.DataFrame(schema=schema)
+    return frame.sort("vessel", "start_at", "parameter_set_id", "parameter")
 
 
 _PARAMETER: dict[str, Any] = {
@@ -52,7 +52,7 @@ _PARAMETER: dict[str, Any] = {
 
 
 def _of_vessel(warehouse: Warehouse, vessel: str, stored_ms: Mapping[str, int]) -> pl.DataFrame:
-    found = history.of_vessel(warehouse, vessel, superseded=True)
+    timeline = history.of_vessel(warehouse, vessel, superseded=True)
     current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
     facts = _sets(warehouse, vessel)
     rows = [
@@ -65,7 +65,7 @@ def _of_vessel(warehouse: Warehouse, vessel: str, stored_ms: Mapping[str, int]) 
             "start_at": row["start_utc_ns"] // 1000,
             "current": row["parameter_set_id"] == current,
         }
-        for row in found.rows()
+        for row in timeline.rows()
     ]
     schema = {"vessel": pl.String, **_PARAMETER}
     return pl.DataFrame(
@@ -99,27 +99,27 @@ def manoeuvres(warehouse: Warehouse) -> pl.DataFrame:
     """
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
     rows = []
-    for one in segments.found_in(warehouse):
-        judged = [c["passed"] for c in one.imo.values() if c.get("passed") is not None]
-        angles = (*one.overshoots_deg, None, None, None)
+    for segment in segments.found_in(warehouse):
+        judged = [c["passed"] for c in segment.imo.values() if c.get("passed") is not None]
+        angles = (*segment.overshoots_deg, None, None, None)
         rows.append(
             {
-                "vessel": one.vessel,
-                "start_at": one.start_utc_ns // 1000,
-                "end_at": one.end_utc_ns // 1000,
-                "kind": one.kind,
-                "psi0_deg": None if one.psi0_deg != one.psi0_deg else one.psi0_deg,
-                "delta0_deg": one.delta0_deg,
-                "first_side": one.first_side,
-                "base_heading_deg": one.base_heading_deg,
-                "executes": len(one.executes_utc_ns),
+                "vessel": segment.vessel,
+                "start_at": segment.start_utc_ns // 1000,
+                "end_at": segment.end_utc_ns // 1000,
+                "kind": segment.kind,
+                "psi0_deg": None if segment.psi0_deg != segment.psi0_deg else segment.psi0_deg,
+                "delta0_deg": segment.delta0_deg,
+                "first_side": segment.first_side,
+                "base_heading_deg": segment.base_heading_deg,
+                "executes": len(segment.executes_utc_ns),
                 **{f"overshoot_{k + 1}_deg": angles[k] for k in range(3)},
                 "imo_passed": all(judged) if judged else None,
-                "excluded": one.excluded,
-                "remarks": " ".join(one.quality.get("reasons") or ()),
-                "file_name": names.get(one.ingest_id),
-                "segment_id": one.segment_id,
-                "log_id": one.log_id,
+                "excluded": segment.excluded,
+                "remarks": " ".join(segment.quality.get("reasons") or ()),
+                "file_name": names.get(segment.ingest_id),
+                "segment_id": segment.segment_id,
+                "log_id": segment.log_id,
             }
         )
     text, real = pl.String, pl.Float64
@@ -137,8 +137,8 @@ def manoeuvres(warehouse: Warehouse) -> pl.DataFrame:
         **{"imo_passed": pl.Boolean, "excluded": text, "remarks": text, "file_name": text},
         **{"segment_id": text, "log_id": text},
     }
-    found = pl.DataFrame(rows, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
-    return found.sort("vessel", "start_at", "segment_id")
+    frame = pl.DataFrame(rows, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
+    return frame.sort("vessel", "start_at", "segment_id")
 
 
 def log_quality(warehouse: Warehouse) -> pl.DataFrame:
@@ -150,9 +150,9 @@ def log_quality(warehouse: Warehouse) -> pl.DataFrame:
     rows = [*logs.current(warehouse), *logs.removed(warehouse)]
     seen = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
     zigzags: dict[str, int] = {}
-    for one in segments.found_in(warehouse):
-        zigzags[one.ingest_id] = zigzags.get(one.ingest_id, 0) + one.is_zigzag
-    counts = [f"{what}_{done}" for what in ("records", "values") for done in ("read", "kept", "rejected")]
+    for segment in segments.found_in(warehouse):
+        zigzags[segment.ingest_id] = zigzags.get(segment.ingest_id, 0) + segment.is_zigzag
+    counts = [f"{item}_{outcome}" for item in ("records", "values") for outcome in ("read", "kept", "rejected")]
     content = [
         {
             "vessel": row.vessel,
@@ -177,8 +177,8 @@ def log_quality(warehouse: Warehouse) -> pl.DataFrame:
         **{"zigzags": whole, "channels": text, "findings": whole, "first_finding": text, "removed": text},
         "log_id": text,
     }
-    found = pl.DataFrame(content, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
-    return found.sort("vessel", "start_at", "log_id")
+    frame = pl.DataFrame(content, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
+    return frame.sort("vessel", "start_at", "log_id")
 
 
 def run_history(warehouse: Warehouse) -> pl.DataFrame:

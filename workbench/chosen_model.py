@@ -87,7 +87,7 @@ def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:
     """
     from kempf.pipeline.model.terms.own import from_file
 
-    found = {}
+    texts = {}
     for path in paths:
         try:
             if path.stat().st_size > _LARGEST:
@@ -99,5 +99,5 @@ def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:
             raise UsageError(
                 "effect_file", f"{path} cannot be read: {error}.", "Name a YAML file as in docs/effects.md."
             ) from error
-        found[from_file(text, str(path)).name] = text
-    return found
+        texts[from_file(text, str(path)).name] = text
+    return texts

@@ -30,7 +30,7 @@ class Linear:
     discrete: StateSpace
 
 
-def as_text(one: ParameterSet, form: str) -> str:
+def as_text(parameter_set: ParameterSet, form: str) -> str:
     """Write a parameter set as YAML, CSV or JSON.
 
     Parameters
@@ -43,10 +43,10 @@ def as_text(one: ParameterSet, form: str) -> str:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(["parameter_set_id", "group", "name", "value", "std", "unit"])
         for group in ("parameters", "discrete", "noise"):
-            for p in getattr(one, group):
-                writer.writerow([one.parameter_set_id, group, p.name, repr(p.value), repr(p.std), p.unit])
+            for p in getattr(parameter_set, group):
+                writer.writerow([parameter_set.parameter_set_id, group, p.name, repr(p.value), repr(p.std), p.unit])
         return stream.getvalue()
-    content = {key: value for key, value in one.show().items() if key != "iterations"}
+    content = {key: value for key, value in parameter_set.show().items() if key != "iterations"}
     if form == "json":
         return json.dumps(content, indent=2) + "\n"
     return str(yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False, allow_unicode=True))
@@ -76,7 +76,7 @@ def linear(ship: ShipOfSet, step_s: float, course_rad: float) -> Linear:
 
 def as_control(model: Linear) -> str:
     """Write a Python module for python-control with the continuous and the discrete system, named, and their noise."""
-    one, about = model.ship.parameter_set, model.continuous
+    parameter_set, about = model.ship.parameter_set, model.continuous
     names, values, spread, units = _parameters(model.ship)
     units_of = {**about.states, **about.inputs, **about.outputs}
     lines = [
@@ -86,9 +86,9 @@ def as_control(model: Linear) -> str:
         "import numpy as np",
         "",
         "nan = np.nan",
-        f"VESSEL = {one.vessel!r}",
-        f"PARAMETER_SET = {one.parameter_set_id!r}",
-        f"CONVERGED = {bool(one.convergence.get('converged'))!r}",
+        f"VESSEL = {parameter_set.vessel!r}",
+        f"PARAMETER_SET = {parameter_set.parameter_set_id!r}",
+        f"CONVERGED = {bool(parameter_set.convergence.get('converged'))!r}",
         f"WARNINGS = {list(model.ship.warnings)!r}",
         f"SPEED_M_S = {about.speed_m_s!r}  # through the water; the matrices hold at this speed",
         f"COURSE_RAD = {about.course_rad!r}  # psi is counted from it",
@@ -125,7 +125,7 @@ def as_mat(model: Linear) -> bytes:
     import numpy as np
     from scipy.io import savemat
 
-    one, about = model.ship.parameter_set, model.continuous
+    parameter_set, about = model.ship.parameter_set, model.continuous
     names, values, spread, units = _parameters(model.ship)
 
     def cells(texts: list[str]) -> Any:
@@ -159,23 +159,23 @@ def as_mat(model: Linear) -> bytes:
         "parameter_values": np.array(values, dtype=np.float64)[:, None],
         "parameter_std": np.array(spread, dtype=np.float64)[:, None],
         "parameter_covariance": model.ship.covariance,
-        "parameter_set_id": one.parameter_set_id,
-        "vessel": one.vessel,
-        "converged": bool(one.convergence.get("converged")),
+        "parameter_set_id": parameter_set.parameter_set_id,
+        "vessel": parameter_set.vessel,
+        "converged": bool(parameter_set.convergence.get("converged")),
         "warnings": cells(list(model.ship.warnings)),
     }
     stream = io.BytesIO()
     savemat(stream, content)
     data = stream.getvalue()
-    described = f"MATLAB 5.0 MAT-file, ship of parameter set {one.parameter_set_id}, written by Kempf"
+    described = f"MATLAB 5.0 MAT-file, ship of parameter set {parameter_set.parameter_set_id}, written by Kempf"
     return described.encode("ascii", "replace")[:_MAT_DESCRIPTION].ljust(_MAT_DESCRIPTION) + data[_MAT_DESCRIPTION:]
 
 
 def _parameters(ship: ShipOfSet) -> tuple[list[str], list[float], list[float | None], list[str]]:
     held = {p.name: p for p in ship.parameter_set.parameters}
-    found = [*(held[name] for name in HULL_PARAMETERS), *ship.effect_parameters]
-    spread = [p.std if p.std is not None and p.std == p.std else None for p in found]
-    return [p.name for p in found], [p.value for p in found], spread, [p.unit for p in found]
+    parameters = [*(held[name] for name in HULL_PARAMETERS), *ship.effect_parameters]
+    spread = [p.std if p.std is not None and p.std == p.std else None for p in parameters]
+    return [p.name for p in parameters], [p.value for p in parameters], spread, [p.unit for p in parameters]
 
 
 def _array(matrix: Any) -> str:

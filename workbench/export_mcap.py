@@ -82,7 +82,7 @@ def to_mcap(
     writer.start(profile="", library=_LIBRARY)
     channels: dict[str, int] = {}
     messages = []
-    for run in sorted(runs, key=lambda one: (one.looked.filtered.run.start_utc_ns, one.name)):
+    for run in sorted(runs, key=lambda run: (run.looked.filtered.run.start_utc_ns, run.name)):
         for topic, stamp, content in chain(_of_run(run), _of_position(*positions.get(run.name, ()))):
             if topic.name not in channels:
                 schema = writer.register_schema(topic.schema, "jsonschema", _schema(topic))
@@ -90,7 +90,7 @@ def to_mcap(
             messages.append((stamp, channels[topic.name], content))
     writer.add_metadata("kempf", dict(about))
     # within one instant in the order of the topics
-    messages.sort(key=lambda one: (one[0], one[1]))
+    messages.sort(key=lambda message: (message[0], message[1]))
     for sequence, (stamp, channel, content) in enumerate(messages):
         data = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
         writer.add_message(channel, stamp, data, stamp, sequence=sequence)
@@ -98,16 +98,16 @@ def to_mcap(
     return out.getvalue()
 
 
-def about(found: Comparison) -> dict[str, str]:
+def about(comparison: Comparison) -> dict[str, str]:
     """Return what a file says of where its predictions come from."""
     content = {
-        "vessel": found.vessel,
-        "parameter_set_id": found.parameter_set.parameter_set_id,
-        "estimator": found.parameter_set.estimator,
-        "effects": ", ".join(found.parameter_set.model_spec.get("effects", ())),
-        "code_version": str(found.parameter_set.provenance.get("code_version", "")),
+        "vessel": comparison.vessel,
+        "parameter_set_id": comparison.parameter_set.parameter_set_id,
+        "estimator": comparison.parameter_set.estimator,
+        "effects": ", ".join(comparison.parameter_set.model_spec.get("effects", ())),
+        "code_version": str(comparison.parameter_set.provenance.get("code_version", "")),
     }
-    for run in found.runs:
+    for run in comparison.runs:
         content[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
     return content
 
@@ -121,8 +121,8 @@ def _schema(topic: _Topic) -> bytes:
 
 
 def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
-    taken = run.looked.filtered.run
-    instant = instants_utc_ns(taken)
+    record = run.looked.filtered.run
+    instant = instants_utc_ns(record)
     begins = _Topic(
         "/run",
         "kempf.run",
@@ -131,26 +131,26 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     for event, at in (("begin", instant[0]), ("end", instant[-1])):
         yield begins, int(at), {"event": event, "segment_id": run.name, "held_out": run.held_out}
     for name, (column, unit, factor) in _CHANNELS.items():
-        first = first_heading(taken) if name == "heading" else None
+        first = first_heading(record) if name == "heading" else None
         # a prediction is made for the moment of its measurement, a little off the grid's instant
-        late = instant + np.round(taken.offset_s[:, column] * SECOND_NS).astype(np.int64)
+        late = instant + np.round(record.offset_s[:, column] * SECOND_NS).astype(np.int64)
         words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
         field = f"{name}_{unit}"
-        shown = {field: _shown(factor * taken.measured[:, column], first)}
+        shown = {field: _shown(factor * record.measured[:, column], first)}
         yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, shown)
-        for horizon, one in (("one_step", run.predicted), ("free_run", run.free)):
-            yield from _predicted(one, horizon, name, words, late, first)
+        for horizon, prediction in (("one_step", run.predicted), ("free_run", run.free)):
+            yield from _predicted(prediction, horizon, name, words, late, first)
             topic = _topic(f"/residual/{horizon}/{name}", f"measured less predicted {words}, {_spoken(horizon)}", field)
-            yield from _series(topic, late, {field: factor * one.error[:, column]})
+            yield from _series(topic, late, {field: factor * prediction.error[:, column]})
     yield from _series(
         _topic("/input/rudder", "rudder angle, deg, starboard positive", "rudder_angle_deg"),
         instant,
-        {"rudder_angle_deg": _DEG * taken.rudder_rad},
+        {"rudder_angle_deg": _DEG * record.rudder_rad},
     )
     yield from _series(
         _topic("/input/speed", "speed through the water, m/s", "speed_through_water_m_s"),
         instant,
-        {"speed_through_water_m_s": taken.speed_m_s},
+        {"speed_through_water_m_s": record.speed_m_s},
     )
 
 
@@ -174,14 +174,14 @@ def _spoken(horizon: str) -> str:
 
 
 def _predicted(
-    one: Predicted, horizon: str, name: str, words: str, instant: Any, first_rad: float | None
+    prediction: Predicted, horizon: str, name: str, words: str, instant: Any, first_rad: float | None
 ) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     column, unit, factor = _CHANNELS[name]
     field = f"{name}_{unit}"
-    columns = {field: _shown(factor * one.predicted[:, column], first_rad)}
+    columns = {field: _shown(factor * prediction.predicted[:, column], first_rad)}
     properties = {field: f"predicted {words}, {_spoken(horizon)}"}
-    if np.isfinite(one.std[:, column]).any():
-        half = WIDTH_95 * factor * one.std[:, column]
+    if np.isfinite(prediction.std[:, column]).any():
+        half = WIDTH_95 * factor * prediction.std[:, column]
         columns |= {"low_95": columns[field] - half, "high_95": columns[field] + half}
         properties |= {"low_95": "lower end of the 95 % interval", "high_95": "upper end of the 95 % interval"}
     topic = _Topic(f"/predicted/{horizon}/{name}", f"kempf.{horizon}.{name}", properties)

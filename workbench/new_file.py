@@ -51,8 +51,8 @@ def require_figures(path: Path | None, count: int = 1, code: str = "figure_forma
     if path.suffix not in _FIGURES:
         raise UsageError(code, f"--figure {path} ends in {path.suffix!r}; expected .png, .svg or .pdf.", "Rename it.")
     paths = [path if k == 0 else path.with_stem(f"{path.stem}-{k + 1}") for k in range(count)]
-    for one in paths:
-        require_new(one, "--figure")
+    for figure in paths:
+        require_new(figure, "--figure")
     return paths
 
 

@@ -52,8 +52,8 @@ def _joined(group: Sequence[str]) -> str:
 def _rank(warning: str) -> int:
     if re.search(_LEAST, warning):
         return len(_GRAVEST) + 1
-    found = [k for k, pattern in enumerate(_GRAVEST) if re.search(pattern, warning)]
-    return found[0] if found else len(_GRAVEST)
+    ranks = [k for k, pattern in enumerate(_GRAVEST) if re.search(pattern, warning)]
+    return ranks[0] if ranks else len(_GRAVEST)
 
 
 def show_warnings(warnings: Sequence[str], *, verbose: bool, word: str = "warning") -> None:
@@ -83,8 +83,8 @@ def of_several(notes: Mapping[str, Sequence[str]]) -> list[str]:
         By the name of the file.
     """
     about: dict[str, list[tuple[str, str]]] = {}
-    for name, said in notes.items():
-        for note in dict.fromkeys(said):
+    for name, sentences in notes.items():
+        for note in dict.fromkeys(sentences):
             about.setdefault(_NUMBER.sub("#", note), []).append((name, note))
     return [
         f"{where[0][1]}" if len(notes) == 1 else f"in {_files([name for name, _ in where])}: {where[0][1]}"

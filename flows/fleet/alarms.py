@@ -107,15 +107,15 @@ def make(url: str, silent_s: float = SILENT_S) -> list[str]:
     webhook = Webhook(method="POST", url=url, headers={"Content-Type": "application/json"})
     document = webhook.save(WEBHOOK, overwrite=True)
     assert isinstance(document, UUID)  # it is a coroutine only where a loop runs
-    made = automations(document, silent_s)
+    alarms = automations(document, silent_s)
     with get_client(sync_client=True) as client:
         known = client.read_automations()
-        for one in made:
+        for alarm in alarms:
             for before in known:
-                if before.name == one.name:
+                if before.name == alarm.name:
                     client.delete_automation(before.id)
-            client.create_automation(one)
-    return [one.name for one in made]
+            client.create_automation(alarm)
+    return [alarm.name for alarm in alarms]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -22,10 +22,10 @@ class LogsFailed(DataRejected):
 
     def __init__(self, outcomes: Sequence[dict[str, Any]]) -> None:
         failed = [outcome for outcome in outcomes if "error" in outcome]
-        said = "; ".join(f"{Path(one['path']).name}: {one['error']['message']}" for one in failed[:5])
+        reasons = "; ".join(f"{Path(outcome['path']).name}: {outcome['error']['message']}" for outcome in failed[:5])
         super().__init__(
             "logs_failed",
-            f"{len(failed)} of {len(outcomes)} logs could not be taken in: {said}{' ...' if failed[5:] else ''}",
+            f"{len(failed)} of {len(outcomes)} logs could not be taken in: {reasons}{' ...' if failed[5:] else ''}",
             "The artifact kempf-ingest of the run says for each why; then run it again.",
             {"outcomes": list(outcomes)},
         )
@@ -39,15 +39,15 @@ def sentence(outcomes: Sequence[dict[str, Any]]) -> str:
     >>> sentence([{"outcome": "new"}, {"outcome": "new"}, {"outcome": "unchanged"}])
     '3 logs: 2 new, 1 unchanged'
     """
-    counts = Counter(str(one["outcome"]) for one in outcomes)
-    said = ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
-    return f"{len(outcomes)} log{'' if len(outcomes) == 1 else 's'}: {said}" if outcomes else "no log is new"
+    counts = Counter(str(outcome["outcome"]) for outcome in outcomes)
+    tally = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
+    return f"{len(outcomes)} log{'' if len(outcomes) == 1 else 's'}: {tally}" if outcomes else "no log is new"
 
 
-def in_quarantine(one: InboxFile) -> dict[str, Any]:
+def in_quarantine(file: InboxFile) -> dict[str, Any]:
     """Return a file in quarantine as the outcome of a log."""
-    error = {"code": one.code, "message": one.message, "next_step": one.next_step}
-    return {"path": one.address, "outcome": "quarantined", "segments": [], "records": None, "error": error}
+    error = {"code": file.code, "message": file.message, "next_step": file.next_step}
+    return {"path": file.address, "outcome": "quarantined", "segments": [], "records": None, "error": error}
 
 
 def table(outcomes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -23,23 +23,23 @@ def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         manoeuvre in which they are seen), ``held_out_before``, ``held_out_after`` (free-run errors), ``note``.
     """
     rows = []
-    for one in diagnoses:
-        ladder = one.get("ladder", [])
+    for diagnosis in diagnoses:
+        ladder = diagnosis.get("ladder", [])
         ends = (ladder[0]["held_out_error"], ladder[-1]["held_out_error"]) if ladder else (None, None)
-        verdict = {"vessel": one["vessel"], "verdict": one["verdict"]}
+        verdict = {"vessel": diagnosis["vessel"], "verdict": diagnosis["verdict"]}
         error = {"held_out_before": ends[0], "held_out_after": ends[1]}
-        note = one["error"]["message"] if "error" in one else ""
-        for found in one.get("sets", []):
-            since = found["since_utc_ns"]
+        note = diagnosis["error"]["message"] if "error" in diagnosis else ""
+        for confusion_set in diagnosis.get("sets", []):
+            since = confusion_set["since_utc_ns"]
             rows.append(
                 {
                     **verdict,
-                    "effects": " or ".join(found["effects"]),
+                    "effects": " or ".join(confusion_set["effects"]),
                     "since": "" if since is None else iso_utc(since),
                     **error,
                     "note": note,
                 }
             )
-        if not one.get("sets"):
+        if not diagnosis.get("sets"):
             rows.append({**verdict, "effects": "", "since": "", **error, "note": note})
     return rows

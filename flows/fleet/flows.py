@@ -55,9 +55,9 @@ def ingest_batch(warehouse: str, paths: list[str], vessel: str | None, profiles:
     """Take a batch of logs in."""
     logs, beside = logs_in([Path(p) for p in paths])
     files = [Path(p) for p in profiles] or list(beside)
-    given = read_profiles(files) if files else None
-    found = ingest_logs.ingest(Warehouse(warehouse), logs, vessel, given)
-    return [outcome.show() for outcome in found]
+    profile = read_profiles(files) if files else None
+    outcomes = ingest_logs.ingest(Warehouse(warehouse), logs, vessel, profile)
+    return [outcome.show() for outcome in outcomes]
 
 
 @task(name="take-inbox", retries=1, retry_delay_seconds=5)
@@ -69,8 +69,8 @@ def inbox_task(warehouse: str, folder: str) -> InboxRun:
         SourceFolder(folder),
         lambda done, of, what: log.info("%s, %d of %d", what, done, of),
     )
-    for one in run.quarantined:
-        log.warning("quarantined: %s: %s %s", one.address, one.message, one.next_step)
+    for file in run.quarantined:
+        log.warning("quarantined: %s: %s %s", file.address, file.message, file.next_step)
     return run
 
 
@@ -100,7 +100,7 @@ def ingest(
     if vessel is None and not profiles:
         runs = [inbox_task(warehouse, folder) for folder in paths]
         outcomes = [outcome.show() for run in runs for outcome in run.ingested]
-        _show_logs(outcomes + [arrivals.in_quarantine(one) for run in runs for one in run.quarantined])
+        _show_logs(outcomes + [arrivals.in_quarantine(file) for run in runs for file in run.quarantined])
         waiting = [run for run in runs if run.quarantined]
         if waiting:
             errors = [NeedsAPerson(run) for run in waiting]
@@ -128,8 +128,8 @@ def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, A
     outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=run_id)
     pooled: ParameterSet | KempfError | None
     try:
-        found = pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=run_id)
-        pooled = found[0] if found else None
+        result = pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=run_id)
+        pooled = result[0] if result else None
     except KempfError as error:
         # that zigzags have nothing in common is no failure of the separate sets
         pooled = error
@@ -262,7 +262,7 @@ def reprocess(
     """
     run_id = flow_run.get_id()
     limits = read_quality(Path(quality)) if quality else NO_LIMITS
-    one = _Run(warehouse, changed_only, str(run_id) if run_id else None)
+    run = _Run(warehouse, changed_only, str(run_id) if run_id else None)
     todo = plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
     get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
     shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
@@ -273,9 +273,9 @@ def reprocess(
 
     reports = {report["vessel"]: report for report in todo.kept}
     if todo.due:
-        reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), progress)}
+        reports |= {report["vessel"]: report for report in run.do(todo.batches(workers()), progress)}
     # each alone: a vessel that takes her worker down takes no other with her
-    for report in one.do([[name] for name in plan.to_try_again(reports.values())], lambda done: None):
+    for report in run.do([[name] for name in plan.to_try_again(reports.values())], lambda done: None):
         reports[report["vessel"]] = plan.together(reports[report["vessel"]], report)
     ordered = [reports[name] for name in sorted(reports)]
     sentence = fleet_report.sentence(ordered, limits)
@@ -292,12 +292,12 @@ def reports_of(
 ) -> list[dict[str, Any]]:
     """Run the flow `reprocess` and return its reports, whichever way it ended."""
     state = reprocess(warehouse, vessels, changed_only, quality, return_state=True)
-    found: Any = state.result(raise_on_failure=False)
-    if isinstance(found, fleet_report.VesselsFailed):
-        found = found.details["reports"]
-    if isinstance(found, Exception):
-        raise found
-    reports: list[dict[str, Any]] = found
+    result: Any = state.result(raise_on_failure=False)
+    if isinstance(result, fleet_report.VesselsFailed):
+        result = result.details["reports"]
+    if isinstance(result, Exception):
+        raise result
+    reports: list[dict[str, Any]] = result
     return reports
 
 
@@ -314,8 +314,8 @@ def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any])
     documents = []
     for vessel in vessels:
         try:
-            found, _ = diagnose_vessel(Warehouse(warehouse), vessel, _model(warehouse, vessel, spec))
-            documents.append(found.show())
+            diagnosis, _ = diagnose_vessel(Warehouse(warehouse), vessel, _model(warehouse, vessel, spec))
+            documents.append(diagnosis.show())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
             documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
         get_run_logger().info("%s: %s", vessel, documents[-1]["verdict"])

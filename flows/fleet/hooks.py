@@ -35,8 +35,8 @@ def ended(flow: Any, run: Any, state: Any) -> None:
         _warn(run, metrics.publish(flow.name, registry))
     if lineage.wanted():
         message = "" if succeeded else str(state.message or state.name)
-        what = _ENDS.get(state.type.name, "FAIL")
-        _warn(run, lineage.emit(lineage.Event(what, flow.name, str(run.id), run.parameters, message)))
+        kind = _ENDS.get(state.type.name, "FAIL")
+        _warn(run, lineage.emit(lineage.Event(kind, flow.name, str(run.id), run.parameters, message)))
 
 
 #: Of every flow.

@@ -29,46 +29,48 @@ _FLOW = "flow"
 Figure = tuple[str, tuple[str, ...], float]
 
 
-def figures_of(flow: str, found: Any) -> Iterator[Figure]:
+def figures_of(flow: str, result: Any) -> Iterator[Figure]:
     """Yield what a run's result says, each with the name of the figure and the values of its labels.
 
     Parameters
     ----------
     flow : str
         Name of the flow.
-    found : object
+    result : object
         What it returned, or the error that it ended with.
     """
-    details = getattr(found, "details", None)
-    rows = details if isinstance(details, Mapping) else found
+    details = getattr(result, "details", None)
+    rows = details if isinstance(details, Mapping) else result
     if flow == "ingest":
         yield from _counted("kempf_run_logs", _outcomes(rows))
     elif flow == "reprocess":
         reports = _rows(rows, "reports")
-        yield from _counted("kempf_run_vessels", [one["status"] for one in reports])
-        yield from _counted("kempf_run_findings", [f["kind"] for one in reports for f in one["findings"]])
-        yield from _counted("kempf_run_failures", [f["error"]["code"] for one in reports for f in one["failures"]])
+        yield from _counted("kempf_run_vessels", [report["status"] for report in reports])
+        yield from _counted("kempf_run_findings", [f["kind"] for report in reports for f in report["findings"]])
+        yield from _counted(
+            "kempf_run_failures", [f["error"]["code"] for report in reports for f in report["failures"]]
+        )
         if reports:
-            yield "kempf_run_new_parameter_sets", (), float(sum(one["new_sets"] for one in reports))
+            yield "kempf_run_new_parameter_sets", (), float(sum(report["new_sets"] for report in reports))
     elif flow == "identify":
-        made = [one for one in _rows(rows) if one.get("parameter_set")]
-        yield "kempf_run_new_parameter_sets", (), float(len(made))
+        sets = [row for row in _rows(rows) if row.get("parameter_set")]
+        yield "kempf_run_new_parameter_sets", (), float(len(sets))
     elif flow == "diagnose":
-        said = {row["vessel"]: row for row in _rows(rows)}
-        yield from _counted("kempf_run_vessels", [row["verdict"] for row in said.values()])
+        by_vessel = {row["vessel"]: row for row in _rows(rows)}
+        yield from _counted("kempf_run_vessels", [row["verdict"] for row in by_vessel.values()])
 
 
 def _outcomes(rows: Any) -> list[str]:
     """Return what became of every log, whether the run was of logs or of an inbox, and however it ended."""
-    found = [str(one["outcome"]) for one in _rows(rows, "outcomes", "ingested")]
-    return found + ["quarantined"] * (len(rows.get("quarantined", ())) if isinstance(rows, Mapping) else 0)
+    outcomes = [str(row["outcome"]) for row in _rows(rows, "outcomes", "ingested")]
+    return outcomes + ["quarantined"] * (len(rows.get("quarantined", ())) if isinstance(rows, Mapping) else 0)
 
 
-def _rows(found: Any, *keys: str) -> Sequence[Any]:
+def _rows(result: Any, *keys: str) -> Sequence[Any]:
     """Return the rows of a result; of an error's details those under some keys. Of neither there are none."""
-    if isinstance(found, Mapping):
-        return [one for key in keys for one in found.get(key, ())]
-    return found if isinstance(found, list) else []
+    if isinstance(result, Mapping):
+        return [row for key in keys for row in result.get(key, ())]
+    return result if isinstance(result, list) else []
 
 
 def _counted(name: str, values: Sequence[str]) -> Iterator[Figure]:

@@ -54,7 +54,7 @@ def _over(report: Mapping[str, Any], quality: Quality) -> dict[str, int]:
 
 
 def _counts(reports: Reports) -> Counter[str]:
-    return Counter(str(one["kind"]) for report in reports for one in report["findings"])
+    return Counter(str(finding["kind"]) for report in reports for finding in report["findings"])
 
 
 def _in_words(counts: Mapping[str, int]) -> str:
@@ -148,7 +148,7 @@ def _quality(reports: Reports, quality: Quality, pages: str | None) -> list[str]
         lines += ["", "| vessel | beyond the limits | for example |", "| --- | --- | --- |"]
     for report in bad[:_MOST_TOLD]:
         over = _over(report, quality)
-        example = next(str(one["words"]) for one in report["findings"] if one["kind"] in over)
+        example = next(str(finding["words"]) for finding in report["findings"] if finding["kind"] in over)
         cells = (", ".join(beyond(report, quality)), example)
         lines.append(f"| {' | '.join((_vessel(report, pages), *map(_cell, cells)))} |")
     if bad[_MOST_TOLD:]:

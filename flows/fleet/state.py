@@ -95,8 +95,8 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     """
     import polars as pl
 
-    asked = None if vessels is None else sorted(set(vessels))
-    where: Where = {} if asked is None else {"vessel_key": [vessel_key(name) for name in asked]}
+    names = None if vessels is None else sorted(set(vessels))
+    where: Where = {} if names is None else {"vessel_key": [vessel_key(name) for name in names]}
 
     def rows(table: str, *columns: str) -> pl.DataFrame:
         return delta.read(warehouse, table, where, ("vessel", *columns))
@@ -109,30 +109,30 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     log_ids, ingest_ids = _by_vessel(current, "log_id"), _by_vessel(current, "ingest_id")
     sets = _by_vessel(rows("parameter_sets", "parameter_set_id"), "parameter_set_id")
     pointers = _by_vessel(rows("aliases", "alias", "parameter_set_id"), "alias", "parameter_set_id")
-    said: dict[str, list[str]] = defaultdict(list)
+    corrections: dict[str, list[str]] = defaultdict(list)
     for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
-        said[row["log_id"]].append(canonical_json(row))
+        corrections[row["log_id"]].append(canonical_json(row))
     draughts: dict[str, list[str]] = defaultdict(list)
     for note in delta.read(warehouse, "notes", where).sort("number").rows(named=True):
         if note["draught_m"] is not None:
             draughts[note["vessel"]].append(canonical_json(note))
     codes = codes_of(warehouse)
     hashes = dict(profiles.select("vessel", "profile_sha256").rows())
-    found = {}
-    for name in sorted(hashes) if asked is None else asked:
-        (held,), (read_as,), (made,) = (of.get(name, ([],)) for of in (log_ids, ingest_ids, sets))
-        found[name] = VesselState(
+    states = {}
+    for name in sorted(hashes) if names is None else names:
+        (held,), (read_as,), (set_ids,) = (of.get(name, ([],)) for of in (log_ids, ingest_ids, sets))
+        states[name] = VesselState(
             name,
             hashes.get(name, ""),
             tuple(held),
             tuple(read_as),
-            tuple(made),
+            tuple(set_ids),
             tuple(zip(*pointers.get(name, ([], [])), strict=True)),
-            tuple(one for log_id in held for one in said.get(log_id, ())) if said else (),
+            tuple(correction for log_id in held for correction in corrections.get(log_id, ())) if corrections else (),
             tuple(draughts.get(name, ())),
             codes,
         )
-    return found
+    return states
 
 
 def _by_vessel(frame: pl.DataFrame, *columns: str) -> dict[str, tuple[list[str], ...]]:

@@ -67,43 +67,43 @@ def add_effect(
         raise UsageError(
             "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
         )
-    wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
+    larger_spec = spec.model_copy(update={"effects": (*spec.effects, name)})
     both = before.beside(own)
     chosen = choose_refreshed(warehouse, vessel, progress)
-    made = stored_model(warehouse, chosen, wanted, both)
-    if made is None:
+    parameter_set = stored_model(warehouse, chosen, larger_spec, both)
+    if parameter_set is None:
         # only a fit needs the estimators, which take a while to load
         from kempf.flows.jobs.vessel_model import store_model
 
-        made, _ = store_model(warehouse, chosen, wanted, both, progress)
-    worse = worsening(made)
+        parameter_set, _ = store_model(warehouse, chosen, larger_spec, both, progress)
+    worse = worsening(parameter_set)
     if worse and not force:
         raise DataRejected(
             "effect_worsens",
             f"{name} makes the predictions of {vessel!r} worse: {'; '.join(worse)}. The model is stored as "
-            f"{made.parameter_set_id}; her current one stays.",
+            f"{parameter_set.parameter_set_id}; her current one stays.",
             "Add it all the same with --force, or see what `kempf diagnose` names.",
-            {"effect": name, "parameter_set_id": made.parameter_set_id, "worse": worse},
+            {"effect": name, "parameter_set_id": parameter_set.parameter_set_id, "worse": worse},
         )
-    point(warehouse, made, now)
-    return made
+    point(warehouse, parameter_set, now)
+    return parameter_set
 
 
-def worsening(made: ParameterSet) -> list[str]:
+def worsening(parameter_set: ParameterSet) -> list[str]:
     """Return what a model predicts worse than its parent one leg ahead, beyond the error, a phrase each."""
-    ahead = made.fit["rung"].get("one_leg_ahead")
-    found = []
-    for sample, one in ((ahead or {}).get("beside_the_rung_below") or {}).items():
+    ahead = parameter_set.fit["rung"].get("one_leg_ahead")
+    phrases = []
+    for sample, change in ((ahead or {}).get("beside_the_rung_below") or {}).items():
         words = {
             "fitted": "of fitted manoeuvres",
             "left_out": "of manoeuvres left out",
             "held_out": "of those held out",
         }
-        if one["in_std"] is None and (one["falls_by"] or 0.0) < 0.0:
-            found.append(f"the prediction {words[sample]} diverges")
-        elif one["in_std"] is not None and one["in_std"] < -WORSE and one["falls_by"] < -LEAST_RISE:
-            found.append(
-                f"the misfit {words[sample]} one leg ahead rises by {-100.0 * one['falls_by']:.0f} % "
-                f"({-one['in_std']:.1f} standard errors; {one['better']} of {one['of']} better)"
+        if change["in_std"] is None and (change["falls_by"] or 0.0) < 0.0:
+            phrases.append(f"the prediction {words[sample]} diverges")
+        elif change["in_std"] is not None and change["in_std"] < -WORSE and change["falls_by"] < -LEAST_RISE:
+            phrases.append(
+                f"the misfit {words[sample]} one leg ahead rises by {-100.0 * change['falls_by']:.0f} % "
+                f"({-change['in_std']:.1f} standard errors; {change['better']} of {change['of']} better)"
             )
-    return found
+    return phrases

@@ -35,7 +35,11 @@ def adopt_code(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[
         ``code_moves``: something would be otherwise. ``nothing_compared``: no set was made by both, or no log read and
         looked through, where that is to be adopted.
     """
-    moving = [one.vessel for one in previews if any((one.moves, one.new, one.gone, one.failures, one.logs_otherwise))]
+    moving = [
+        preview.vessel
+        for preview in previews
+        if any((preview.moves, preview.new, preview.gone, preview.failures, preview.logs_otherwise))
+    ]
     if moving:
         raise DataRejected(
             "code_moves",
@@ -45,31 +49,31 @@ def adopt_code(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[
             {"vessels": moving},
         )
     made_by = _codes(warehouse, previews)
-    sets, read = sum(one.identical for one in previews), sum(one.logs for one in previews)
-    compared = tuple(one.vessel for one in previews if one.identical or one.logs)
-    found = []
+    sets, read = sum(preview.identical for preview in previews), sum(preview.logs for preview in previews)
+    compared = tuple(preview.vessel for preview in previews if preview.identical or preview.logs)
+    new_equivalents = []
     for stage, old in made_by.items():
         present = code_version.fingerprint(stage)
         if old is not None and old not in (present, equivalents.code_of(warehouse, stage)):
-            found.append(Equivalent(stage, present, old, sets, compared, code_version.git_commit()))
-    if any(not (sets if one.stage == "estimate" else read) for one in found):
+            new_equivalents.append(Equivalent(stage, present, old, sets, compared, code_version.git_commit()))
+    if any(not (sets if equivalent.stage == "estimate" else read) for equivalent in new_equivalents):
         raise DataRejected(
             "nothing_compared",
             f"The present code and the one before made {sets} parameter sets of {len(previews)} vessels and read "
             f"{read} logs: too little to say that they do the same.",
             "Preview a vessel that has logs and parameter sets.",
         )
-    equivalents.adopt(warehouse, found)
-    return found
+    equivalents.adopt(warehouse, new_equivalents)
+    return new_equivalents
 
 
 def _codes(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> dict[Stage, str | None]:
     """Return the code that made most of what stands, by stage."""
     rows = logs.current(warehouse)
-    sets = [stored for one in previews for stored in standing_sets(warehouse, one.vessel)]
+    sets = [stored for preview in previews for stored in standing_sets(warehouse, preview.vessel)]
     return {
         "ingest": _most(row.code_version for row in rows),
-        "segment": _most(one.code_version for one in segments.found_in(warehouse)),
+        "segment": _most(segment.code_version for segment in segments.found_in(warehouse)),
         "estimate": _most(str(stored.provenance["code_version"]) for stored in sets),
     }
 

@@ -89,30 +89,32 @@ def as_sailed(
     pairs : sequence of (Segment, Manoeuvre)
         What was measured, and what of it is to be sailed.
     """
-    zigzags = [segment for segment, asked in pairs if isinstance(asked, Zigzag)]
+    zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, Zigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
-    found, logs = [], _Logs(warehouse)
-    for done, (segment, asked) in enumerate(pairs):
+    manoeuvres, logs = [], _Logs(warehouse)
+    for done, (segment, manoeuvre) in enumerate(pairs):
         progress(done, len(pairs), f"reading {segment.segment_id}")
-        found.append(_one(predicted, asked, segment, logs.of(segment), runs.get(segment.segment_id)))
+        manoeuvres.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id)))
     progress(len(pairs), len(pairs), "read")
-    return found
+    return manoeuvres
 
 
-def _one(predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None) -> AsSailed:
+def _one(
+    predicted: Predicted, manoeuvre: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None
+) -> AsSailed:
     speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
     passed = _passed(run, predicted) if run else None
     executes = segment.executes_utc_ns or (segment.start_utc_ns,)
-    seen = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
+    beginning = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
     if run is not None:
-        seen = replace(seen, start=_start(run, passed, segment))
+        beginning = replace(beginning, start=_start(run, passed, segment))
     held = set(predicted.parameter_set.convergence.get("held_out") or ())
     fitted = segment.segment_id in predicted.parameter_set.segment_ids and segment.segment_id not in held
     return AsSailed(
         segment=segment,
-        manoeuvre=_as_ordered(asked, segment),
+        manoeuvre=_as_ordered(manoeuvre, segment),
         speed_m_s=speed_m_s,
-        began=seen.counted_from(radians(segment.base_heading_deg)),
+        began=beginning.counted_from(radians(segment.base_heading_deg)),
         wind_force_m_s2=_steady_wind(run, passed) if run and passed else (0.0, 0.0),
         arm_per_m=run.run.ship.arm_per_m if run else 0.0,
         sample="fitted" if fitted else "held_out",
@@ -133,10 +135,10 @@ class _Logs:
 
 
 def _runs(
-    warehouse: Warehouse, predicted: Predicted, wanted: list[Segment], progress: Progress
+    warehouse: Warehouse, predicted: Predicted, zigzags: list[Segment], progress: Progress
 ) -> dict[str, RunFilter]:
     """Return every zigzag whose log can be used, by its id, under the model of the set."""
-    chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in wanted}
+    chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in zigzags}
     kept = tuple(segment for segment in chosen.segments if segment.segment_id in names)
     if not kept:
         return {}
@@ -161,8 +163,8 @@ def _beside_the_set(
     warehouse: Warehouse, predicted: Predicted, chosen: Chosen, progress: Progress
 ) -> tuple[GridRun, ...]:
     """Return runs of further manoeuvres as those of the set are: profile, step, slip and load on the set's scale."""
-    basis, one = predicted.basis, predicted.parameter_set
-    inputs: dict[str, Any] = dict(one.provenance.get("inputs") or {})
+    basis, parameter_set = predicted.basis, predicted.parameter_set
+    inputs: dict[str, Any] = dict(parameter_set.provenance.get("inputs") or {})
     logs, others = {s.log_id for s in chosen.segments}, [(s.segment_id, s) for s in chosen.segments]
     noted = notes.draughts_m(notes.of_vessel(warehouse, predicted.vessel), chosen.segments)
     alike = replace(
@@ -171,20 +173,22 @@ def _beside_the_set(
         profile_sha256=str(inputs["profile_sha256"]),
         loads=loads_beside(basis.bounds.items(), inputs.get("draughts_m", {}), others, noted),
     )
-    spec = ModelSpec.model_validate(dict(one.model_spec))
+    spec = ModelSpec.model_validate(dict(parameter_set.model_spec))
     return assembled(warehouse, alike, spec, progress, basis.alike).runs
 
 
-def _as_ordered(asked: Manoeuvre, segment: Segment) -> Manoeuvre:
+def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
     side = 1 if segment.first_side == "starboard" else -1
     rudder = radians(float(segment.detail.get("delta0_measured_deg") or segment.delta0_deg))
-    if isinstance(asked, Zigzag):
+    if isinstance(manoeuvre, Zigzag):
         executes = list(segment.detail.get("executes", ()))[1:]
         switched = [radians(abs(float(e["heading_deg"]))) for e in executes]
-        return replace(asked, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: asked.overshoots + 1]))
-    if isinstance(asked, Spiral):
-        return replace(asked, rudder_rad=rudder)
-    return replace(asked, side=side, rudder_rad=rudder)  # type: ignore[type-var]
+        return replace(
+            manoeuvre, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: manoeuvre.overshoots + 1])
+        )
+    if isinstance(manoeuvre, Spiral):
+        return replace(manoeuvre, rudder_rad=rudder)
+    return replace(manoeuvre, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 
 def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:

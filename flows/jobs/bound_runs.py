@@ -114,7 +114,7 @@ def bound(warehouse: Warehouse, vessel: str, set_id: str | None = None, progress
         values,
         (*HULL_PARAMETERS, *model.names),
         by_legs,
-        tuple(BoundRun(*one) for one in zip(filtered, ordered, held, levels, strict=True)),
+        tuple(BoundRun(*parts) for parts in zip(filtered, ordered, held, levels, strict=True)),
         dict(data.skipped),
     )
 
@@ -123,9 +123,9 @@ def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
     """Return hull, parameters of effects and lasting noise, and the model that they belong to."""
     known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
     model = EffectModel(named(chosen.model_spec.get("effects", ()), known))
-    found = {p.name: p.value for p in chosen.parameters}
+    estimates = {p.name: p.value for p in chosen.parameters}
     names = (*HULL_PARAMETERS, *model.names)
-    lacking = [name for name in names if not np.isfinite(found.get(name, np.nan))]
+    lacking = [name for name in names if not np.isfinite(estimates.get(name, np.nan))]
     if lacking:
         raise DataRejected(
             "set_without_parameters",
@@ -133,7 +133,7 @@ def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
             "Compare a set with all six parameters; `kempf params list` names them.",
             {"lacking": lacking},
         )
-    values = np.array([found[name] for name in names])
+    values = np.array([estimates[name] for name in names])
     model, effects = with_lasting_noise(chosen, model, values[len(HULL_PARAMETERS) :])
     return values[: len(HULL_PARAMETERS)], effects, model
 
@@ -156,8 +156,8 @@ def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
     names = chosen.settings.get("segments") or [""] * len(bounds)
     kept = [b for name, b in zip(names, bounds, strict=True) if name not in unseen]
     ids = frozenset(chosen.segment_ids) - unseen
-    found = tuple(s for s in segments.current(warehouse, vessel) if s.segment_id in ids)
-    return _Seen(ids, tuple((b["log_id"], b["start_utc_ns"], b["end_utc_ns"]) for b in kept), found)
+    own_segments = tuple(s for s in segments.current(warehouse, vessel) if s.segment_id in ids)
+    return _Seen(ids, tuple((b["log_id"], b["start_utc_ns"], b["end_utc_ns"]) for b in kept), own_segments)
 
 
 def _is_seen(segment: Segment, seen: _Seen) -> bool:
@@ -176,18 +176,18 @@ def _levels(
     filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet
 ) -> list[Levels]:
     """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
-    kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
+    set_levels: Mapping[str, Any] = chosen.convergence.get("levels") or {}
     own, sources = [], []
-    for k, one in enumerate(filtered):
-        if one.run.name in kept and not held[k]:
-            own.append(np.array(kept[one.run.name], dtype=np.float64))
+    for k, run_filter in enumerate(filtered):
+        if run_filter.run.name in set_levels and not held[k]:
+            own.append(np.array(set_levels[run_filter.run.name], dtype=np.float64))
             sources.append("fitted with the parameters")
         else:
-            found = fit_levels(one, hull, values, first_levels(one))
-            own.append(found.levels)
-            sources.append("fitted to this manoeuvre, parameters held" + ("" if found.converged else "; not converged"))
-    seen = [levels for levels, out in zip(own, held, strict=True) if not out]
-    mean = np.mean(seen, axis=0) if seen else None
+            fit = fit_levels(run_filter, hull, values, first_levels(run_filter))
+            own.append(fit.levels)
+            sources.append("fitted to this manoeuvre, parameters held" + ("" if fit.converged else "; not converged"))
+    fitted_levels = [levels for levels, out in zip(own, held, strict=True) if not out]
+    mean = np.mean(fitted_levels, axis=0) if fitted_levels else None
     return [
         Levels(levels, levels, words)
         if mean is None or not out

@@ -51,21 +51,21 @@ class CheckedPredictions:
 
     def predict(self, request: PredictRequest, progress: Progress = silent, count: int = DRAWS) -> Predicted:
         """Predict one, see `predict_checked`; set and speed are those of the first request."""
-        made = predict_with(self._hers, request, progress, count)
+        predicted = predict_with(self._hers, request, progress, count)
         # a model whose ships do not sail the manoeuvre is left out, of the check too
-        names = tuple(one.model.name for one in made.prediction.models)
+        names = tuple(member.model.name for member in predicted.prediction.models)
         if names not in self._checks:
-            self._checks[names] = _check(self._warehouse, made, progress)
+            self._checks[names] = _check(self._warehouse, predicted, progress)
         check = self._checks[names]
         if not check.models:
-            return replace(made, own_zigzags=check.own)
-        gear = made.prediction.models[0].model.rudder_rate
+            return replace(predicted, own_zigzags=check.own)
+        gear = predicted.prediction.models[0].model.rudder_rate
         models = [replace(model, rudder_rate=gear) for model in check.models]
-        asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
-        prediction = predict(models, asked, made.basis.logs, length_m, count)
-        prediction = replace(prediction, run_away=(*made.prediction.run_away, *prediction.run_away))
-        limits = limits_of(prediction, made.parameter_set)
-        return replace(made, prediction=prediction, limits=limits, own_zigzags=check.own)
+        manoeuvre, length_m = predicted.prediction.manoeuvre, predicted.basis.profile.length_m
+        prediction = predict(models, manoeuvre, predicted.basis.logs, length_m, count)
+        prediction = replace(prediction, run_away=(*predicted.prediction.run_away, *prediction.run_away))
+        limits = limits_of(prediction, predicted.parameter_set)
+        return replace(predicted, prediction=prediction, limits=limits, own_zigzags=check.own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,46 +77,46 @@ class _Check:
     models: tuple[Identified, ...] = ()
 
 
-def _check(warehouse: Warehouse, made: Predicted, progress: Progress) -> _Check:
-    zigzags = own_zigzags(warehouse, made, progress)
-    own = _overshoots(made, zigzags)
+def _check(warehouse: Warehouse, predicted: Predicted, progress: Progress) -> _Check:
+    zigzags = own_zigzags(warehouse, predicted, progress)
+    own = _overshoots(predicted, zigzags)
     before = held_against(_rows(own), len(zigzags))
     if not missed(_rows(own)):
         return _Check(before)
-    fitted = [one for one in zigzags if one.sample == "fitted"]
-    nearer = _with_models(made, lambda model: _brought(model, made, fitted))
+    fitted = [zigzag for zigzag in zigzags if zigzag.sample == "fitted"]
+    nearer = _with_models(predicted, lambda model: _brought(model, predicted, fitted))
     own = _overshoots(nearer, zigzags)
     alone = _overshoots(_with_models(nearer, lambda model: model.scattered_alone()), zigzags)
     both = [name for name in own if name in alone]
     share = scatter(_rows({name: own[name] for name in both}), _rows({name: alone[name] for name in both}))
-    models = tuple(one.model.scattered(share) for one in nearer.prediction.models)
-    brought = any(one.model.conditioned for one in nearer.prediction.models)
+    models = tuple(member.model.scattered(share) for member in nearer.prediction.models)
+    brought = any(member.model.conditioned for member in nearer.prediction.models)
     after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before if brought else None)
     return _Check(after, models)
 
 
-def _brought(model: Identified, made: Predicted, zigzags: Sequence[AsSailed]) -> Identified:
+def _brought(model: Identified, predicted: Predicted, zigzags: Sequence[AsSailed]) -> Identified:
     measured = []
-    for one in zigzags:
-        wanted = {name: value for name, value in figures_of(one.segment).items() if name in _FIRST_TWO}
-        measured.append(OwnZigzag(one.on_the_day(model, made.basis), one.manoeuvre, wanted))
+    for zigzag in zigzags:
+        figures = {name: value for name, value in figures_of(zigzag.segment).items() if name in _FIRST_TWO}
+        measured.append(OwnZigzag(zigzag.on_the_day(model, predicted.basis), zigzag.manoeuvre, figures))
     return conditioned(model, measured)
 
 
-def _with_models(made: Predicted, changed: Callable[[Identified], Identified]) -> Predicted:
-    models = tuple(replace(one, model=changed(one.model)) for one in made.prediction.models)
-    return replace(made, prediction=replace(made.prediction, models=models))
+def _with_models(predicted: Predicted, changed: Callable[[Identified], Identified]) -> Predicted:
+    models = tuple(replace(member, model=changed(member.model)) for member in predicted.prediction.models)
+    return replace(predicted, prediction=replace(predicted.prediction, models=models))
 
 
-def _overshoots(made: Predicted, zigzags: Sequence[AsSailed]) -> dict[tuple[str, str], list[float]]:
+def _overshoots(predicted: Predicted, zigzags: Sequence[AsSailed]) -> dict[tuple[str, str], list[float]]:
     """Return measured, predicted and the ends of the interval, by zigzag and figure."""
-    found: dict[tuple[str, str], list[float]] = {}
-    for zigzag in (beside(made, one) for one in zigzags):
-        for figure in zigzag.figures:
+    overshoots: dict[tuple[str, str], list[float]] = {}
+    for manoeuvre in (beside(predicted, zigzag) for zigzag in zigzags):
+        for figure in manoeuvre.figures:
             value, low, high = figure.predicted.value, figure.predicted.low, figure.predicted.high
             if value is not None and low is not None and high is not None:
-                found[zigzag.segment_id, figure.name] = [figure.measured, value, low, high]
-    return found
+                overshoots[manoeuvre.segment_id, figure.name] = [figure.measured, value, low, high]
+    return overshoots
 
 
 def _rows(columns: dict[tuple[str, str], list[float]]) -> Float:

@@ -64,7 +64,7 @@ class MeasuredManoeuvre:
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        return {**vars(self), "figures": [one.show() for one in self.figures]}
+        return {**vars(self), "figures": [figure.show() for figure in self.figures]}
 
 
 def measured_beside(
@@ -81,10 +81,10 @@ def measured_beside(
     predicted : Predicted
         Says which kind and angles.
     """
-    asked = predicted.prediction.manoeuvre
-    wanted = [s for s in segments.every(warehouse, predicted.vessel) if _same_order(s, asked)]
-    every = as_sailed(warehouse, predicted, [(segment, asked) for segment in wanted], progress)
-    return tuple(beside(predicted, one) for one in every)
+    manoeuvre = predicted.prediction.manoeuvre
+    matches = [s for s in segments.every(warehouse, predicted.vessel) if _same_order(s, manoeuvre)]
+    every = as_sailed(warehouse, predicted, [(segment, manoeuvre) for segment in matches], progress)
+    return tuple(beside(predicted, sailed) for sailed in every)
 
 
 def own_zigzags(warehouse: Warehouse, predicted: Predicted, progress: Progress = silent) -> list[AsSailed]:
@@ -94,29 +94,29 @@ def own_zigzags(warehouse: Warehouse, predicted: Predicted, progress: Progress =
     return as_sailed(warehouse, predicted, pairs, progress)
 
 
-def _same_order(segment: Segment, asked: Manoeuvre) -> bool:
-    if segment.kind != _KINDS[type(asked)]:
+def _same_order(segment: Segment, manoeuvre: Manoeuvre) -> bool:
+    if segment.kind != _KINDS[type(manoeuvre)]:
         return False
     rudder = radians(segment.delta0_deg)
-    same = abs(rudder - asked.rudder_rad) < radians(_SAME_DEG)  # type: ignore[attr-defined]
-    if isinstance(asked, Zigzag):
-        return same and abs(radians(segment.psi0_deg) - asked.heading_rad) < radians(_SAME_DEG)
-    return same or isinstance(asked, Spiral)
+    same = abs(rudder - manoeuvre.rudder_rad) < radians(_SAME_DEG)  # type: ignore[attr-defined]
+    if isinstance(manoeuvre, Zigzag):
+        return same and abs(radians(segment.psi0_deg) - manoeuvre.heading_rad) < radians(_SAME_DEG)
+    return same or isinstance(manoeuvre, Spiral)
 
 
-def beside(predicted: Predicted, one: AsSailed) -> MeasuredManoeuvre:
+def beside(predicted: Predicted, sailed: AsSailed) -> MeasuredManoeuvre:
     """Lay a prediction over one manoeuvre."""
-    segment, basis = one.segment, predicted.basis
-    models = [one.on_the_day(each.model, basis) for each in predicted.prediction.models]
-    about = (segment.segment_id, segment.first_side, one.speed_m_s, one.wind_force_m_s2[0], one.sample)
+    segment, basis = sailed.segment, predicted.basis
+    models = [sailed.on_the_day(each.model, basis) for each in predicted.prediction.models]
+    about = (segment.segment_id, segment.first_side, sailed.speed_m_s, sailed.wind_force_m_s2[0], sailed.sample)
     try:
-        made = predict(models, one.manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
+        prediction = predict(models, sailed.manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
     except KempfError as error:
         return MeasuredManoeuvre(*about, (), error.message)
     figures = tuple(
-        Beside(name, *_measured(figure), made.figures[name])
+        Beside(name, *_measured(figure), prediction.figures[name])
         for name, figure in figures_of(segment).items()
-        if name in made.figures and _measured(figure)[0] is not None
+        if name in prediction.figures and _measured(figure)[0] is not None
     )
     return MeasuredManoeuvre(*about, figures)
 

@@ -66,19 +66,19 @@ class Comparison:
 
     def where(self) -> dict[str, Any]:
         """Say where the model fails, on fitted and on held-out runs apart; None where there are no such runs."""
-        found: dict[str, Any] = {}
+        misfits: dict[str, Any] = {}
         for sample in (FITTED, HELD_OUT):
             looked = self._of(sample)
-            found[sample] = where(looked) if looked else None
-        return found
+            misfits[sample] = where(looked) if looked else None
+        return misfits
 
     def marks(self, evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
         """Return at which instants what speaks against the model shows, see `kempf.pipeline.compare.marks.marks`."""
-        found: dict[str, dict[str, Mask]] = {}
+        masks: dict[str, dict[str, Mask]] = {}
         for sample in (FITTED, HELD_OUT):
-            own = [one for one in evidence if one.sample == sample]
-            found |= marks(self._of(sample), own) if own else {}
-        return found
+            own = [item for item in evidence if item.sample == sample]
+            masks |= marks(self._of(sample), own) if own else {}
+        return masks
 
     def _of(self, sample: str) -> list[Looked]:
         return [run.looked for run in self.runs if run.sample == sample]
@@ -115,24 +115,24 @@ def compare_vessel(
 
 def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> Comparison:
     """Predict every run at a horizon; errors are those of `compare_vessel`."""
-    runs, found, skipped = [], [], dict(hers.skipped)
-    for k, one in enumerate(hers.runs):
-        progress(k, len(hers.runs), f"predicting {one.segment.segment_id}")
+    runs, segments, skipped = [], [], dict(hers.skipped)
+    for k, bound_run in enumerate(hers.runs):
+        progress(k, len(hers.runs), f"predicting {bound_run.segment.segment_id}")
         try:
             run = compare_run(
-                *(one.filtered, Point(hers.hull, hers.values, one.levels.foreseen), horizon),
-                held_out=one.held_out,
+                *(bound_run.filtered, Point(hers.hull, hers.values, bound_run.levels.foreseen), horizon),
+                held_out=bound_run.held_out,
                 legs=hers.legs,
-                levels_from=one.levels.source,
-                own_levels=one.levels.own,
-                phases=phases_s(one.segment.detail.get("phases", ()), one.filtered.run.start_utc_ns),
-                turns=_turns(one.segment, one.filtered.run),
+                levels_from=bound_run.levels.source,
+                own_levels=bound_run.levels.own,
+                phases=phases_s(bound_run.segment.detail.get("phases", ()), bound_run.filtered.run.start_utc_ns),
+                turns=_turns(bound_run.segment, bound_run.filtered.run),
             )
         except DataRejected as error:
-            skipped[one.segment.segment_id] = error.message
+            skipped[bound_run.segment.segment_id] = error.message
             continue
         runs.append(run)
-        found.append(one.segment)
+        segments.append(bound_run.segment)
     progress(len(hers.runs), len(hers.runs), "predicted")
     if not runs:
         raise DataRejected(
@@ -142,7 +142,7 @@ def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> 
             "Ask for another horizon, or compare another parameter set with --set.",
             {"skipped": skipped},
         )
-    return Comparison(hers.vessel, hers.parameter_set, hers.alias, horizon, tuple(runs), tuple(found), skipped)
+    return Comparison(hers.vessel, hers.parameter_set, hers.alias, horizon, tuple(runs), tuple(segments), skipped)
 
 
 def _turns(segment: Segment, run: GridRun) -> tuple[Turn, ...]:

@@ -138,8 +138,8 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     """
     require_reason(reason)
     log = logs.by_prefix(warehouse, log_name)
-    known = [s for s in segments.found_in(warehouse, log.vessel) if s.ingest_id == log.ingest_id and s.is_zigzag]
-    held = next((one for one in known if same((one.start_utc_ns, one.end_utc_ns), bounds_utc_ns)), None)
+    zigzags = [s for s in segments.found_in(warehouse, log.vessel) if s.ingest_id == log.ingest_id and s.is_zigzag]
+    held = next((zigzag for zigzag in zigzags if same((zigzag.start_utc_ns, zigzag.end_utc_ns), bounds_utc_ns)), None)
     if held is not None and (_subject(held) != bounds_utc_ns or _is_looked_through(warehouse, log, held)):
         raise UsageError(
             "bounds_overlap",
@@ -153,9 +153,11 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
 
 def _is_looked_through(warehouse: Warehouse, log: LogRow, segment: Segment) -> bool:
     """Return whether a log was looked through with all that was said of it; else a command was cut off, and goes on."""
-    said = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
-    seen = examinations.of_ingests(warehouse, [log.ingest_id], [log.vessel]).get(log.ingest_id)
-    return seen is not None and seen.code_version == corrections.basis(segment.code_version, said)
+    log_corrections = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
+    examination = examinations.of_ingests(warehouse, [log.ingest_id], [log.vessel]).get(log.ingest_id)
+    return examination is not None and examination.code_version == corrections.basis(
+        segment.code_version, log_corrections
+    )
 
 
 _DONE = {"correct": "corrected", "exclude": "excluded", "accept": "accepted"}
@@ -164,9 +166,11 @@ _DONE = {"correct": "corrected", "exclude": "excluded", "accept": "accepted"}
 def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correction: Correction) -> Planned:
     if correction.bounds_utc_ns is not None:
         _require_within(log, correction.bounds_utc_ns)
-    said = _with(corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ()), correction)
-    searched = search_again(warehouse, log, said)
-    after = next((one for one in searched.segments if _subject(one) == correction.subject_utc_ns), None)
+    log_corrections = _with(corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ()), correction)
+    searched = search_again(warehouse, log, log_corrections)
+    after = next(
+        (manoeuvre for manoeuvre in searched.segments if _subject(manoeuvre) == correction.subject_utc_ns), None
+    )
     own = (after.start_utc_ns, after.end_utc_ns) if after else None
     if correction.bounds_utc_ns not in (None, own):
         raise DataRejected(
@@ -184,13 +188,13 @@ def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correct
             {"log_id": log.log_id},
         )
     _refuse_overlap(searched.segments, after)
-    held = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
-    stays = {one.segment_id for one in searched.segments if one.excluded is None}
-    lost = [one for one in held if one.excluded is None and one.segment_id not in stays]
-    for one in lost:
-        if one.is_zigzag and segment is not None and one.segment_id != segment.segment_id:
-            raise _overlap(one)
-    gone = [one.segment_id for one in lost]
+    held = [manoeuvre for manoeuvre in segments.found_in(warehouse, log.vessel) if manoeuvre.ingest_id == log.ingest_id]
+    stays = {manoeuvre.segment_id for manoeuvre in searched.segments if manoeuvre.excluded is None}
+    lost = [manoeuvre for manoeuvre in held if manoeuvre.excluded is None and manoeuvre.segment_id not in stays]
+    for manoeuvre in lost:
+        if manoeuvre.is_zigzag and segment is not None and manoeuvre.segment_id != segment.segment_id:
+            raise _overlap(manoeuvre)
+    gone = [manoeuvre.segment_id for manoeuvre in lost]
     return Planned(
         log,
         segment.segment_id if segment else None,
@@ -199,7 +203,7 @@ def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correct
         after,
         of_segments(warehouse, log.vessel, gone),
         searched,
-        said,
+        log_corrections,
     )
 
 
@@ -221,12 +225,12 @@ def _require_within(log: LogRow, bounds: Bounds) -> None:
         )
 
 
-def _refuse_overlap(found: Sequence[Segment], corrected: Segment) -> None:
+def _refuse_overlap(manoeuvres: Sequence[Segment], corrected: Segment) -> None:
     """Refuse bounds under which two zigzags would share readings: they would be fitted twice."""
-    zigzags = sorted((s for s in found if s.is_zigzag and s.excluded is None), key=lambda s: s.start_utc_ns)
-    for one, other in pairwise(zigzags):
-        if one.end_utc_ns > other.start_utc_ns and corrected.segment_id in (one.segment_id, other.segment_id):
-            beside = other if one.segment_id == corrected.segment_id else one
+    zigzags = sorted((s for s in manoeuvres if s.is_zigzag and s.excluded is None), key=lambda s: s.start_utc_ns)
+    for earlier, later in pairwise(zigzags):
+        if earlier.end_utc_ns > later.start_utc_ns and corrected.segment_id in (earlier.segment_id, later.segment_id):
+            beside = later if earlier.segment_id == corrected.segment_id else earlier
             raise _overlap(beside)
 
 
@@ -239,10 +243,10 @@ def _overlap(beside: Segment) -> UsageError:
     )
 
 
-def _with(said: Sequence[Correction], correction: Correction) -> tuple[Correction, ...]:
+def _with(log_corrections: Sequence[Correction], correction: Correction) -> tuple[Correction, ...]:
     """Return what was said of a log with one more; a command that was killed and is repeated says nothing more."""
-    mine = [one for one in said if one.subject_utc_ns == correction.subject_utc_ns]
-    return tuple(said) if mine and mine[-1] == correction else (*said, correction)
+    mine = [entry for entry in log_corrections if entry.subject_utc_ns == correction.subject_utc_ns]
+    return tuple(log_corrections) if mine and mine[-1] == correction else (*log_corrections, correction)
 
 
 def _subject(segment: Segment) -> Bounds | None:

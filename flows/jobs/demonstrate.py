@@ -99,10 +99,10 @@ def demonstrate(folder: Path, progress: Progress = silent) -> Demonstration:
         ) from error
     ingested = ingest(warehouse, [logs / name for name in trials], hull.name, profile, progress)
     identified = identify_vessel(warehouse, hull.name, progress=progress)
-    made = [o.parameter_set.parameter_set_id for o in identified if o.parameter_set is not None]
+    set_ids = [o.parameter_set.parameter_set_id for o in identified if o.parameter_set is not None]
     reruns = []
-    for done, name in enumerate(made):
-        progress(done, len(made), f"rerunning {name}")
+    for done, name in enumerate(set_ids):
+        progress(done, len(set_ids), f"rerunning {name}")
         reruns.append(rerun(warehouse, name))
     truth = dict(zip(HULL_PARAMETERS, astuple(hull.parameters), strict=True))
     return Demonstration(folder, hull.name, truth, ingested, identified, reruns)

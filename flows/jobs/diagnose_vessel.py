@@ -80,23 +80,23 @@ def diagnose_again(
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)
     content = {**as_json(diagnosis), "where": where_left(diagnosis, phases)}
-    made = StoredDiagnosis(
+    row = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
         vessel=chosen.vessel,
         parameter_set_id=base.parameter_set_id,
         start_utc_ns=min(s.start_utc_ns for s in chosen.segments),
         verdict=content["verdict"],
-        effects=tuple(name for one in content["sets"] for name in one["effects"]),
+        effects=tuple(name for effect_set in content["sets"] for name in effect_set["effects"]),
         content=content,
         inputs=inputs,
         code_version=inputs["code_version"],
     )
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         evidence = evidence_of(diagnosis, phases, _zigzags(chosen), examined.runs.skipped, workers)
-    diagnoses.keep_evidence(warehouse, chosen.vessel, made.diagnosis_id, evidence)
-    diagnoses.insert(warehouse, made)
+    diagnoses.keep_evidence(warehouse, chosen.vessel, row.diagnosis_id, evidence)
+    diagnoses.insert(warehouse, row)
     # as it is read back, so that new and known answers are the same
-    stored = diagnoses.find(warehouse, made.diagnosis_id)
+    stored = diagnoses.find(warehouse, row.diagnosis_id)
     assert stored is not None
     return stored
 
@@ -118,13 +118,13 @@ def examine(
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        made = diagnose(
+        diagnosis = diagnose(
             *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
             listener=reported_to(progress),
         )
     progress(1, 1, "done")
-    return FullDiagnosis(chosen, runs, made)
+    return FullDiagnosis(chosen, runs, diagnosis)
 
 
 def _phases(examined: FullDiagnosis) -> dict[str, tuple[PhaseInterval, ...]]:

@@ -29,16 +29,16 @@ def draft(path: Path) -> str:
         data, _ = unpack(path.name, log.whole())
     if not data:
         raise DataRejected("empty_log", f"{path.name} is empty.", "Copy the file again from the logger.")
-    found = sniff(data)
-    if found == "mcap":
+    log_format = sniff(data)
+    if log_format == "mcap":
         return _of_topics(path, LogFile(data))
-    if found == "nmea":
-        raise _no_draft(path, "an NMEA 0183 log", "Ingest it as it is: NMEA logs describe themselves.", found)
-    columns = delimited.columns_found(data, None, most=None) if found and not is_json(data) else []
+    if log_format == "nmea":
+        raise _no_draft(path, "an NMEA 0183 log", "Ingest it as it is: NMEA logs describe themselves.", log_format)
+    columns = delimited.columns_found(data, None, most=None) if log_format and not is_json(data) else []
     if not columns:
-        what = "of no known format" if found is None else "text without columns"
+        description = "of no known format" if log_format is None else "text without columns"
         next_step = "Export the log as delimited text with a line of column names, or as NMEA 0183 or MCAP."
-        raise _no_draft(path, "JSON text" if is_json(data) else what, next_step, found)
+        raise _no_draft(path, "JSON text" if is_json(data) else description, next_step, log_format)
     return draft_profile.draft_profile(path.name, columns, delimited.titled(data))
 
 
@@ -51,6 +51,8 @@ def _of_topics(path: Path, log: LogFile) -> str:
     return draft_profile.draft_topics(path.name, topics)
 
 
-def _no_draft(path: Path, what: str, next_step: str, found: str | None) -> UsageError:
-    wanted = "a profile is drafted from the columns of delimited text or the topics of MCAP"
-    return UsageError("no_draft", f"{path.name} is {what}; {wanted}.", next_step, {"path": str(path), "format": found})
+def _no_draft(path: Path, description: str, next_step: str, log_format: str | None) -> UsageError:
+    rule = "a profile is drafted from the columns of delimited text or the topics of MCAP"
+    return UsageError(
+        "no_draft", f"{path.name} is {description}; {rule}.", next_step, {"path": str(path), "format": log_format}
+    )

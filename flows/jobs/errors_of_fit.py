@@ -50,5 +50,5 @@ def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
     if of_effects:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        found = with_instants(fit, workers)
-    return Errors(found.fit, known, found.covariance, of_effects)
+        instants = with_instants(fit, workers)
+    return Errors(instants.fit, known, instants.covariance, of_effects)

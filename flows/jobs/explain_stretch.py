@@ -77,7 +77,7 @@ def explain_stretch(
         raise UsageError("window_empty", "The stretch ends before it begins.", "Give a later end.")
     hers = bound(warehouse, vessel, set_id, progress)
     run = _run_of(hers, start_utc_ns, end_utc_ns)
-    used = [one for one in hers.runs if not one.held_out]
+    used = [bound_run for bound_run in hers.runs if not bound_run.held_out]
     if not used:
         raise DataRejected(
             "nothing_fitted",
@@ -91,46 +91,46 @@ def explain_stretch(
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         # no step of the search: what the set says is looked at as it is
         base = fit(
-            [one.filtered for one in runs],
+            [bound_run.filtered for bound_run in runs],
             hers.hull,
-            np.array([one.levels.own for one in runs]),
+            np.array([bound_run.levels.own for bound_run in runs]),
             hers.values,
             workers,
             max_iterations=0,
         )
-        found = explain(
+        explanation = explain(
             base,
-            [not one.held_out for one in runs],
+            [not bound_run.held_out for bound_run in runs],
             runs.index(run),
             (start_utc_ns <= time) & (time <= end_utc_ns),
             known,
             workers,
         )
     progress(1, 1, "scored")
-    return ExplainedStretch(vessel, hers.parameter_set, run, start_utc_ns, end_utc_ns, found)
+    return ExplainedStretch(vessel, hers.parameter_set, run, start_utc_ns, end_utc_ns, explanation)
 
 
 def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int) -> BoundRun:
     """Return the manoeuvre that a stretch lies in; the stretch may reach beyond its ends."""
     spans = []
-    found = []
-    for one in hers.runs:
-        time = instants_utc_ns(one.filtered.run)
-        spans.append(f"{one.segment.segment_id} {iso_utc(int(time[0]))[:19]} to {iso_utc(int(time[-1]))[:19]}")
+    runs = []
+    for run in hers.runs:
+        time = instants_utc_ns(run.filtered.run)
+        spans.append(f"{run.segment.segment_id} {iso_utc(int(time[0]))[:19]} to {iso_utc(int(time[-1]))[:19]}")
         if int(time[0]) <= end_utc_ns and start_utc_ns <= int(time[-1]):
-            found.append(one)
-    if not found:
+            runs.append(run)
+    if not runs:
         raise NotFound(
             "no_stretch",
             f"No manoeuvre of {hers.vessel!r} that can be predicted is between {iso_utc(start_utc_ns)} and "
             f"{iso_utc(end_utc_ns)}.",
             "Choose a stretch of one of them: " + "; ".join(spans[:10]) + ".",
         )
-    if len(found) > 1:
-        names = ", ".join(one.segment.segment_id for one in found)
+    if len(runs) > 1:
+        names = ", ".join(run.segment.segment_id for run in runs)
         raise UsageError(
             "stretch_over_several",
             f"The stretch reaches over several manoeuvres, {names}, whose noise is not the same.",
             "Take a stretch of one of them.",
         )
-    return found[0]
+    return runs[0]

@@ -28,7 +28,7 @@ from kempf.schemas.quality import Quality
 LARGEST_BYTES = 1 << 16
 
 
-def read_bytes(path: Path, what: str) -> bytes:
+def read_bytes(path: Path, kind: str) -> bytes:
     """Return the bytes of a file.
 
     Raises
@@ -38,11 +38,11 @@ def read_bytes(path: Path, what: str) -> bytes:
     DataRejected
         ``file_too_large``.
     """
-    with _opened(path, what) as stream:
-        return whole(LogFile(stream), str(path), what)
+    with _opened(path, kind) as stream:
+        return whole(LogFile(stream), str(path), kind)
 
 
-def whole(file: LogFile, where: str, what: str) -> bytes:
+def whole(file: LogFile, where: str, kind: str) -> bytes:
     """Return the bytes of an open file that a person wrote.
 
     Raises
@@ -53,7 +53,7 @@ def whole(file: LogFile, where: str, what: str) -> bytes:
     if file.size > LARGEST_BYTES:
         raise DataRejected(
             "file_too_large",
-            f"{where} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
+            f"{where} has {file.size} bytes; a {kind} of more than {LARGEST_BYTES} is not read.",
             "Look whether it is the right file; a long profile may be given as several files.",
             {"path": where, "bytes": file.size},
         )
@@ -74,7 +74,7 @@ def opened_log(path: Path) -> Iterator[LogFile]:
 
 
 @contextmanager
-def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
+def _opened(path: Path, kind: str) -> Iterator[BinaryIO]:
     """Open a file.
 
     Raises
@@ -93,7 +93,7 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(status.st_mode):
             raise UsageError(
                 "not_a_file",
-                f"{path} is a device, a pipe or a socket; a {what} is a file.",
+                f"{path} is a device, a pipe or a socket; a {kind} is a file.",
                 "Write it to a file first and give that.",
                 {"path": str(path)},
             )
@@ -103,21 +103,21 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         near = get_close_matches(path.name, beside)
         raise NotFound(
             "no_such_file",
-            f"There is no {what} at {path}.",
+            f"There is no {kind} at {path}.",
             f"Check the path; names in the folder that are like it: {', '.join(near)}." if near else "Check the path.",
             {"path": str(path)},
         ) from error
     except IsADirectoryError as error:
         raise UsageError(
             "path_is_directory",
-            f"{path} is a folder; a {what} is a file.",
+            f"{path} is a folder; a {kind} is a file.",
             f"Give its files, as in {path}/*.",
             {"path": str(path)},
         ) from error
     except OSError as error:
         raise KempfError(
             "file_unreadable",
-            f"Reading the {what} {path} failed: {error.strerror or error}.",
+            f"Reading the {kind} {path} failed: {error.strerror or error}.",
             "Look at the path and at the file's permissions.",
             {"path": str(path)},
         ) from error
@@ -125,21 +125,21 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         yield stream
 
 
-def _yaml_of(data: bytes, what: str, where: str) -> Any:
+def _yaml_of(data: bytes, kind: str, where: str) -> Any:
     """Return what the bytes of a YAML file say."""
     try:
         return yaml_text.load(data)
     except yaml_text.TooLarge as error:
         raise UsageError(
             "yaml_too_large",
-            f"The {what} {where} is not read: {error}.",
+            f"The {kind} {where} is not read: {error}.",
             "Write it without nested aliases.",
             {"path": where},
         ) from error
     except yaml_text.NotYaml as error:
         raise UsageError(
             "not_yaml",
-            f"The {what} {where} is not valid YAML: {error}.",
+            f"The {kind} {where} is not valid YAML: {error}.",
             "Correct the line it names.",
             {"path": where},
         ) from error
@@ -176,11 +176,11 @@ def logs_in(paths: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
         if str(path) == "." or not os.path.isdir(path):  # noqa: PTH112 - False, and no error, for a name too long
             logs.append(path)
             continue
-        found = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p.relative_to(path)))
-        own = [p for p in found if p.name in PROFILES]
+        files = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p.relative_to(path)))
+        own = [p for p in files if p.name in PROFILES]
         beside += own
-        logs += [p for p in found if p not in own]
-        if len(found) == len(own):
+        logs += [p for p in files if p not in own]
+        if len(files) == len(own):
             raise NotFound(
                 "empty_folder", f"There is no log in the folder {path}.", "Check the path.", {"path": str(path)}
             )

@@ -41,7 +41,7 @@ class Ingest:
 
 
 def find_segments(
-    ingest: Ingest, profile: VesselProfile, instruments: Instruments, said: Sequence[Correction] = ()
+    ingest: Ingest, profile: VesselProfile, instruments: Instruments, log_corrections: Sequence[Correction] = ()
 ) -> tuple[list[Segment], tuple[str, ...]]:
     """Find the manoeuvres of one ingest; nothing is stored.
 
@@ -49,7 +49,7 @@ def find_segments(
     ----------
     instruments : Instruments
         Its channels.
-    said : sequence of Correction, optional
+    log_corrections : sequence of Correction, optional
         What a person said of the manoeuvres of this log, in the order in which it was said.
 
     Returns
@@ -66,29 +66,31 @@ def find_segments(
         note = f"no {missing} in this log: manoeuvres cannot be looked for; map it in the profile if the log has it"
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    standing = corrections.standing(said)
+    standing = corrections.standing(log_corrections)
     marked, notes = corrections.applied(
         find_manoeuvres(heading, rudder, speed),
         standing,
         lambda bounds: zigzag_between(heading, rudder, speed, *bounds),
     )
-    manoeuvres = [_marked(one, ingest, profile, instruments) for one in marked]
-    turning = find_turning(instruments, [one.zigzag for one in marked])
-    others = [_kept_aside(one, ingest, profile) for one in turning]
-    taken = [(one.start_utc_ns, one.end_utc_ns) for one in (*manoeuvres, *others)]
-    others += [_random(one, ingest, profile, instruments) for one in find_random(instruments, taken)]
-    return [*manoeuvres, *(_with(one, standing) for one in others)], (*instruments.notes, *notes)
+    manoeuvres = [_marked(marked_zigzag, ingest, profile, instruments) for marked_zigzag in marked]
+    turning = find_turning(instruments, [marked_zigzag.zigzag for marked_zigzag in marked])
+    others = [_kept_aside(manoeuvre, ingest, profile) for manoeuvre in turning]
+    spans = [(segment.start_utc_ns, segment.end_utc_ns) for segment in (*manoeuvres, *others)]
+    others += [_random(manoeuvre, ingest, profile, instruments) for manoeuvre in find_random(instruments, spans)]
+    return [*manoeuvres, *(_with(segment, standing) for segment in others)], (*instruments.notes, *notes)
 
 
-def _marked(one: Marked, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
+def _marked(marked_zigzag: Marked, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
     """Return a zigzag with what a person said of it."""
-    segment = _segment(one.zigzag, ingest, profile, instruments)
-    return segment if one.standing is None else _with(segment, [one.standing])
+    segment = _segment(marked_zigzag.zigzag, ingest, profile, instruments)
+    return segment if marked_zigzag.standing is None else _with(segment, [marked_zigzag.standing])
 
 
-def _with(segment: Segment, said: Sequence[Standing]) -> Segment:
+def _with(segment: Segment, standings: Sequence[Standing]) -> Segment:
     """Return a segment with what was said of its manoeuvre."""
-    mine = next((one for one in said if one.concerns(segment.start_utc_ns, segment.end_utc_ns)), None)
+    mine = next(
+        (standing for standing in standings if standing.concerns(segment.start_utc_ns, segment.end_utc_ns)), None
+    )
     if mine is None:
         return segment
     subject = dict(zip(("start_utc_ns", "end_utc_ns"), mine.subject_utc_ns, strict=True))
@@ -127,23 +129,23 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
     )
 
 
-def _random(one: RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
-    detail = {"heading_range_deg": one.heading_range_deg, **_of_fitted(one, ingest, profile, instruments)}
-    quality = {"gap_s": one.gap_s, "reasons": one.reasons}
-    return _no_zigzag(one, ingest, "random_manoeuvre", one.orders_utc_ns, quality, detail)
+def _random(manoeuvre: RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
+    detail = {"heading_range_deg": manoeuvre.heading_range_deg, **_of_fitted(manoeuvre, ingest, profile, instruments)}
+    quality = {"gap_s": manoeuvre.gap_s, "reasons": manoeuvre.reasons}
+    return _no_zigzag(manoeuvre, ingest, "random_manoeuvre", manoeuvre.orders_utc_ns, quality, detail)
 
 
 def _of_fitted(
-    one: Zigzag | RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments
+    manoeuvre: Zigzag | RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments
 ) -> dict[str, Any]:
     """Return the detail of a manoeuvre that a model is fitted to."""
-    bounds = one.start_utc_ns, one.end_utc_ns
+    bounds = manoeuvre.start_utc_ns, manoeuvre.end_utc_ns
     return {
-        "lateral_speed": lateral_summary(instruments, *bounds, one.base_heading_deg),
+        "lateral_speed": lateral_summary(instruments, *bounds, manoeuvre.base_heading_deg),
         # which others may help one without a log is decided before any is read again
         "has_log": has_log(instruments, *bounds),
         "shaft_speed_per_s": shaft_speed(instruments, *bounds),
-        **({} if _own_time(one.start_utc_ns, ingest, profile) else {"own_time": False}),
+        **({} if _own_time(manoeuvre.start_utc_ns, ingest, profile) else {"own_time": False}),
     }
 
 
@@ -154,52 +156,56 @@ def _own_time(start_utc_ns: int, ingest: Ingest, profile: VesselProfile) -> bool
     return not stated and start_utc_ns >= CLOCK_FIRST_NS
 
 
-def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
+def _kept_aside(manoeuvre: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
     """Return a manoeuvre that no model is fitted to, with its figures."""
-    if isinstance(one, TurningCircle):
-        return _turning_circle(one, ingest, profile)
-    quality = {"reasons": one.reasons}
+    if isinstance(manoeuvre, TurningCircle):
+        return _turning_circle(manoeuvre, ingest, profile)
+    quality = {"reasons": manoeuvre.reasons}
     detail: dict[str, Any] = {
         "length_m": profile.length_m,
-        "figures": {name: asdict(figure) for name, figure in one.figures.items()},
+        "figures": {name: asdict(figure) for name, figure in manoeuvre.figures.items()},
     }
-    if isinstance(one, PullOut):
+    if isinstance(manoeuvre, PullOut):
         detail |= {
-            "delta0_measured_deg": one.delta0_measured_deg,
-            "rudder_after_deg": one.rudder_after_deg,
-            "partner_start_utc_ns": one.partner_start_utc_ns,
-            "verdict": one.verdict,
+            "delta0_measured_deg": manoeuvre.delta0_measured_deg,
+            "rudder_after_deg": manoeuvre.rudder_after_deg,
+            "partner_start_utc_ns": manoeuvre.partner_start_utc_ns,
+            "verdict": manoeuvre.verdict,
         }
-        return _no_zigzag(one, ingest, "pull_out", (one.start_utc_ns,), quality, detail)
-    detail |= {"loop": one.loop, "n_ways": one.n_ways, "points": [asdict(point) for point in one.points]}
-    executes = tuple(point.start_utc_ns for point in one.points)
-    return _no_zigzag(one, ingest, "spiral", executes, quality, detail)
+        return _no_zigzag(manoeuvre, ingest, "pull_out", (manoeuvre.start_utc_ns,), quality, detail)
+    detail |= {
+        "loop": manoeuvre.loop,
+        "n_ways": manoeuvre.n_ways,
+        "points": [asdict(point) for point in manoeuvre.points],
+    }
+    executes = tuple(point.start_utc_ns for point in manoeuvre.points)
+    return _no_zigzag(manoeuvre, ingest, "spiral", executes, quality, detail)
 
 
-def _turning_circle(one: TurningCircle, ingest: Ingest, profile: VesselProfile) -> Segment:
-    made = one.measured
+def _turning_circle(circle: TurningCircle, ingest: Ingest, profile: VesselProfile) -> Segment:
+    measurement = circle.measured
     detail = {
         "length_m": profile.length_m,
-        "figures": {name: asdict(figure) for name, figure in made.figures.items()},
-        "figures_over_ground": made.over_ground,
-        "figures_less_drift": made.less_drift,
-        "track": made.track,
-        "circle_drift": asdict(made.drift) if made.drift else None,
-        "corrected_for_current": made.corrected,
-        "delta0_measured_deg": one.delta0_measured_deg,
-        "execute_uncertainty_s": one.execute_uncertainty_s,
-        "heading_change_deg": one.heading_change_deg,
-        "approach_speed_m_s": made.approach_speed_m_s,
-        "approach_speed_trend_percent": made.approach_speed_trend_percent,
+        "figures": {name: asdict(figure) for name, figure in measurement.figures.items()},
+        "figures_over_ground": measurement.over_ground,
+        "figures_less_drift": measurement.less_drift,
+        "track": measurement.track,
+        "circle_drift": asdict(measurement.drift) if measurement.drift else None,
+        "corrected_for_current": measurement.corrected,
+        "delta0_measured_deg": circle.delta0_measured_deg,
+        "execute_uncertainty_s": circle.execute_uncertainty_s,
+        "heading_change_deg": circle.heading_change_deg,
+        "approach_speed_m_s": measurement.approach_speed_m_s,
+        "approach_speed_trend_percent": measurement.approach_speed_trend_percent,
     }
-    executes = () if one.execute_utc_ns is None else (one.execute_utc_ns,)
-    criteria = judge_circle(one, profile.length_m, profile.trial_speed_m_s)
-    segment = _no_zigzag(one, ingest, "turning_circle", executes, asdict(one.quality), detail)
+    executes = () if circle.execute_utc_ns is None else (circle.execute_utc_ns,)
+    criteria = judge_circle(circle, profile.length_m, profile.trial_speed_m_s)
+    segment = _no_zigzag(circle, ingest, "turning_circle", executes, asdict(circle.quality), detail)
     return replace(segment, imo={shown.pop("name"): shown for shown in map(asdict, criteria)})
 
 
 def _no_zigzag(
-    one: TurningCircle | PullOut | Spiral | RandomManoeuvre,
+    manoeuvre: TurningCircle | PullOut | Spiral | RandomManoeuvre,
     ingest: Ingest,
     kind: str,
     executes_utc_ns: tuple[int, ...],
@@ -208,17 +214,17 @@ def _no_zigzag(
 ) -> Segment:
     """Return a manoeuvre with neither a nominal heading deviation nor overshoots, without criteria."""
     return Segment(
-        segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
+        segment_id=segment_id(ingest.log_id, kind, manoeuvre.start_utc_ns, manoeuvre.end_utc_ns),
         vessel=ingest.vessel,
         log_id=ingest.log_id,
         ingest_id=ingest.ingest_id,
         kind=kind,
         psi0_deg=nan,
-        delta0_deg=one.delta0_deg,
-        first_side=one.side,
-        base_heading_deg=one.base_heading_deg,
-        start_utc_ns=one.start_utc_ns,
-        end_utc_ns=one.end_utc_ns,
+        delta0_deg=manoeuvre.delta0_deg,
+        first_side=manoeuvre.side,
+        base_heading_deg=manoeuvre.base_heading_deg,
+        start_utc_ns=manoeuvre.start_utc_ns,
+        end_utc_ns=manoeuvre.end_utc_ns,
         executes_utc_ns=executes_utc_ns,
         overshoots_deg=(),
         code_version=ingest.code_version,

@@ -45,7 +45,7 @@ def of_logs(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
         Current ones of one vessel, at least one.
     """
     vessel, ingests = rows[0].vessel, {row.ingest_id for row in rows}
-    gone = tuple(one.segment_id for one in segments.found_in(warehouse, vessel) if one.ingest_id in ingests)
+    gone = tuple(segment.segment_id for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in ingests)
     return _following(warehouse, vessel, tuple(rows), gone, {row.log_id for row in rows}, set())
 
 
@@ -64,9 +64,11 @@ def _following(
 ) -> Following:
     held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
     superseded = [
-        one.parameter_set_id
-        for one in held
-        if not (set(one.log_ids).isdisjoint(log_ids) and set(one.segment_ids).isdisjoint(segment_ids))
+        parameter_set.parameter_set_id
+        for parameter_set in held
+        if not (
+            set(parameter_set.log_ids).isdisjoint(log_ids) and set(parameter_set.segment_ids).isdisjoint(segment_ids)
+        )
     ]
     current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
     return Following(vessel, rows, gone, tuple(superseded), current in superseded)

@@ -75,9 +75,9 @@ class IdentifyOutcome:
     converged: bool = False
 
 
-def _made(segment: Segment, made: ParameterSet) -> IdentifyOutcome:
-    converged = bool(made.convergence.get("converged"))
-    return IdentifyOutcome(segment, made, new=True, set_id=made.parameter_set_id, converged=converged)
+def _made(segment: Segment, parameter_set: ParameterSet) -> IdentifyOutcome:
+    converged = bool(parameter_set.convergence.get("converged"))
+    return IdentifyOutcome(segment, parameter_set, new=True, set_id=parameter_set.parameter_set_id, converged=converged)
 
 
 def identify_vessel(
@@ -113,8 +113,11 @@ def identify_vessel(
     with waiting(warehouse, vessel) as new:
         outcomes = identify_segments(warehouse, vessel, request, refreshed, new, flow_run=flow_run, progress=progress)
     there = [o.set_id for o in outcomes if o.set_id is not None and o.parameter_set is None]
-    kept = {one.parameter_set_id: one for one in parameter_sets.get_all(warehouse, vessel, there)}
-    return [o if o.set_id not in kept else replace(o, parameter_set=kept[o.set_id]) for o in outcomes]
+    stored_sets = {
+        parameter_set.parameter_set_id: parameter_set
+        for parameter_set in parameter_sets.get_all(warehouse, vessel, there)
+    }
+    return [o if o.set_id not in stored_sets else replace(o, parameter_set=stored_sets[o.set_id]) for o in outcomes]
 
 
 def identify_segments(
@@ -153,27 +156,30 @@ def identify_segments(
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
-    wanted = _wanted(warehouse, request, readable, by_ingest)
-    names = [one.set_id for one in wanted]
-    known = {one.parameter_set_id: one for one in parameter_sets.convergences(warehouse, vessel, names=names)}
+    tasks = _wanted(warehouse, request, readable, by_ingest)
+    names = [task.set_id for task in tasks]
+    known = {
+        convergence.parameter_set_id: convergence
+        for convergence in parameter_sets.convergences(warehouse, vessel, names=names)
+    }
     outcomes = [
         IdentifyOutcome(segment, None, error=refreshed.failed[segment.ingest_id])
         for segment in current
         if segment.ingest_id in refreshed.failed
     ]
     missing: dict[str, list[_Wanted]] = {}
-    for one in wanted:
-        held = known.get(one.set_id)
+    for task in tasks:
+        held = known.get(task.set_id)
         if held is None:
-            missing.setdefault(one.segment.ingest_id, []).append(one)
+            missing.setdefault(task.segment.ingest_id, []).append(task)
         else:
-            outcomes.append(IdentifyOutcome(one.segment, None, set_id=one.set_id, converged=held.converged))
+            outcomes.append(IdentifyOutcome(task.segment, None, set_id=task.set_id, converged=held.converged))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, (ingest, hers) in enumerate(missing.items()):
             progress(done, len(missing), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
-            made = _identify_log(warehouse, vessel, hers, pool, flow_run, table_versions, by_ingest)
-            outcomes += made
-            new.keep([o.parameter_set for o in made if o.parameter_set])
+            log_outcomes = _identify_log(warehouse, vessel, hers, pool, flow_run, table_versions, by_ingest)
+            outcomes += log_outcomes
+            new.keep([o.parameter_set for o in log_outcomes if o.parameter_set])
     progress(len(missing), len(missing), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
     _point_to_current(new, outcomes, request, adopt=adopt)
@@ -198,39 +204,39 @@ def _wanted(
     alone = request.estimator not in CAN or bool(request.spec.effects)
     hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
     profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
-    found, code = [], code_of(warehouse, "estimate")
+    tasks, code = [], code_of(warehouse, "estimate")
     for segment in readable:
         sha256 = by_ingest[segment.ingest_id].profile_sha256
         beside = () if alone or not without_log(segment) else companions_of(segment, readable, by_ingest)
         inputs = inputs_of(segment, sha256, request, beside, code)
-        found.append(_Wanted(segment, inputs, parameter_set_id(inputs), tuple(beside), profiles[sha256]))
-    return found
+        tasks.append(_Wanted(segment, inputs, parameter_set_id(inputs), tuple(beside), profiles[sha256]))
+    return tasks
 
 
 def _identify_log(
     warehouse: Warehouse,
     vessel: str,
-    wanted: Sequence[_Wanted],
+    tasks: Sequence[_Wanted],
     pool: ThreadPoolExecutor,
     flow_run: str | None,
     table_versions: Mapping[str, int],
     by_ingest: Mapping[str, logs.LogRow],
 ) -> list[IdentifyOutcome]:
     """Identify segments of one log, one a thread; the new sets are stored by the caller."""
-    ingests = {s.ingest_id for one in wanted for s in (one.segment, *one.companions)}
+    ingests = {s.ingest_id for task in tasks for s in (task.segment, *task.companions)}
     held = {by_ingest[i].log_id: channels_of(warehouse, i) for i in sorted(ingests)}
 
-    def one(asked: _Wanted) -> IdentifyOutcome:
-        used = [s.ingest_id for s in (asked.segment, *asked.companions)]
-        origin = provenance.collect(warehouse, asked.inputs, used, flow_run, table_versions, vessel)
-        ids = (asked.segment.segment_id,)
+    def one(task: _Wanted) -> IdentifyOutcome:
+        used = [s.ingest_id for s in (task.segment, *task.companions)]
+        origin = provenance.collect(warehouse, task.inputs, used, flow_run, table_versions, vessel)
+        ids = (task.segment.segment_id,)
         try:
-            made = build(held, SetRequest(asked.inputs, asked.profile, vessel, ids, origin))
+            parameter_set = build(held, SetRequest(task.inputs, task.profile, vessel, ids, origin))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
-            return IdentifyOutcome(asked.segment, None, error=wrapped(error))
-        return _made(asked.segment, made)
+            return IdentifyOutcome(task.segment, None, error=wrapped(error))
+        return _made(task.segment, parameter_set)
 
-    return list(pool.map(one, wanted))
+    return list(pool.map(one, tasks))
 
 
 def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
@@ -317,14 +323,14 @@ def build(instruments: Mapping[str, Instruments], request: SetRequest) -> Parame
         result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, instruments)
         return as_parameter_set(result, request, without_arm(spec, arm))
     single, unsure = inputs.estimator == SINGLE, not record.instant_errors.known
-    made = build_with_errors_that_last(instruments, request) if single and unsure else None
-    if made is not None:
-        return made
+    parameter_set = build_with_errors_that_last(instruments, request) if single and unsure else None
+    if parameter_set is not None:
+        return parameter_set
     result = estimate(
         *(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
     )
     if single and not unsure and may_last(result.fit):
-        made = build_with_errors_that_last(instruments, request)
-        if made is not None:
-            return made
+        parameter_set = build_with_errors_that_last(instruments, request)
+        if parameter_set is not None:
+            return parameter_set
     return as_parameter_set(result, request, without_arm(spec, arm))

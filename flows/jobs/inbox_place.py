@@ -44,11 +44,11 @@ class Register:
         UsageError
             ``several_vessels``: the patterns of several are those of its name.
         """
-        given = self.of_folder.get(file.folder)
-        if given is not None and given.vessel is not None:
-            return Place(given.vessel, given)
+        folder_profile = self.of_folder.get(file.folder)
+        if folder_profile is not None and folder_profile.vessel is not None:
+            return Place(folder_profile.vessel, folder_profile)
         if file.folder and (file.folder in self.known or self.new_vessels):
-            return Place(file.folder, given)
+            return Place(file.folder, folder_profile)
         fit = sorted(name for name, profile in self.known.items() if _fits(profile, file))
         if len(fit) > 1:
             raise UsageError(
@@ -59,7 +59,7 @@ class Register:
                 {"path": file.path, "vessels": fit},
             )
         if fit:
-            return Place(fit[0], given)
+            return Place(fit[0], folder_profile)
         raise self._not_placed(file)
 
     def _not_placed(self, file: SourceFile) -> KempfError:
@@ -82,9 +82,9 @@ def no_vessel(name: str, known: Iterable[str], next_step: str) -> NotFound:
     """Return the error of a name that is no vessel's."""
     names = sorted(known)
     like = get_close_matches(name, names)
-    said = f"; like it: {', '.join(map(repr, like))}" if like else f"; known: {', '.join(names[:20]) or 'none'}"
+    hint = f"; like it: {', '.join(map(repr, like))}" if like else f"; known: {', '.join(names[:20]) or 'none'}"
     return NotFound(
-        "no_vessel", f"There is no vessel {name!r}{said}.", next_step, {"vessel": name, "known": names[:20]}
+        "no_vessel", f"There is no vessel {name!r}{hint}.", next_step, {"vessel": name, "known": names[:20]}
     )
 
 

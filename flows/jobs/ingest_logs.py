@@ -205,15 +205,17 @@ def ingest_log(
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
-            said = corrections.of_logs(warehouse, [row.log_id])
-            search_log.store(warehouse, [search_log.search_again(warehouse, row, said.get(row.log_id, ()))])
+            corrections_by_log = corrections.of_logs(warehouse, [row.log_id])
+            search_log.store(
+                warehouse, [search_log.search_again(warehouse, row, corrections_by_log.get(row.log_id, ()))]
+            )
         stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
-        seen = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel])[row.ingest_id]
-        return _outcome(warehouse, path, "unchanged", row, stored_segments, seen)
+        examination = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel])[row.ingest_id]
+        return _outcome(warehouse, path, "unchanged", row, stored_segments, examination)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
-        said = corrections.of_logs(warehouse, [log.sha256])
-        read = look_through(vessel, file_name, log, profile, readings, said.get(log.sha256, ()), codes)
+        corrections_by_log = corrections.of_logs(warehouse, [log.sha256])
+        read = look_through(vessel, file_name, log, profile, readings, corrections_by_log.get(log.sha256, ()), codes)
         give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
@@ -256,7 +258,7 @@ def look_through(
     log: LogFile,
     profile: VesselProfile,
     readings: LogReadings,
-    said: Sequence[Correction],
+    log_corrections: Sequence[Correction],
     codes: Codes,
 ) -> ReadLog:
     """Find the manoeuvres of a log that was read, as a person corrected them, and compare its channels."""
@@ -266,7 +268,7 @@ def look_through(
     give_back(readings.tally.records_read)
     refused = count(readings.rejections())
     records = readings.tally.records_read
-    searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records, said)
+    searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records, log_corrections)
     _log.info(
         "%s of %s: %d records read, %d kept; %d manoeuvres",
         *(file_name, vessel, records, readings.tally.records_kept, len(searched.segments)),
@@ -284,5 +286,5 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     """
     # manoeuvres and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and
     # not missed
-    search_log.store(warehouse, [one.found for one in read])
-    return deposit(warehouse, [one.delivery for one in read])
+    search_log.store(warehouse, [log.found for log in read])
+    return deposit(warehouse, [log.delivery for log in read])

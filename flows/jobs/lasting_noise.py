@@ -18,13 +18,13 @@ def lasting_noise_of(fit: PooledFit) -> tuple[StoredValue, ...]:
     )
 
 
-def with_lasting_noise(one: ParameterSet, model: EffectModel, values: Float) -> tuple[EffectModel, Float]:
+def with_lasting_noise(parameter_set: ParameterSet, model: EffectModel, values: Float) -> tuple[EffectModel, Float]:
     """Return a ship's model and its values, shape (p,), with the lasting noise of a set at their end.
 
     Noise levels of a set belong to this model.
     """
-    found = {p.name: p.value for p in one.noise}
-    noise = tuple(process for name, process in lasting_noise().items() if f"{name}.c" in found)
+    levels = {p.name: p.value for p in parameter_set.noise}
+    noise = tuple(process for name, process in lasting_noise().items() if f"{name}.c" in levels)
     whole = EffectModel((*model.effects, *noise))
-    own = [found[name] for name in whole.names[len(model.names) :]]
+    own = [levels[name] for name in whole.names[len(model.names) :]]
     return whole, np.concatenate([values, np.array(own, dtype=np.float64)])

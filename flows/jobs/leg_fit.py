@@ -8,18 +8,18 @@ from kempf.pipeline.channels.series import Float
 from kempf.warehouse.parameter_set import ParameterSet
 
 
-def fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | None:
+def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, float] | None:
     """Return hull, effects, covariance and its factor of the fit one leg ahead.
 
     None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
     left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
     "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
     """
-    ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    ahead = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
     if ahead is None or ahead["better_than_one_step"] is None:
         return None
     # by name, as JSON keeps no order; the covariance is in that of the set
-    names = [p.name for p in one.parameters if p.name in ahead["parameters"]]
+    names = [p.name for p in parameter_set.parameters if p.name in ahead["parameters"]]
     values = np.array([ahead["parameters"][name]["value"] for name in names], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
     fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")

@@ -19,7 +19,7 @@ def in_order(named: Iterable[tuple[str, S]]) -> list[tuple[str, S]]:
 
 def logs_in_order(named: Iterable[tuple[str, S]]) -> list[str]:
     """Return the logs of named stretches in the order of time."""
-    return list(dict.fromkeys(one.log_id for _, one in in_order(named)))
+    return list(dict.fromkeys(stretch.log_id for _, stretch in in_order(named)))
 
 
 def loads_of_logs(named: Iterable[tuple[str, S]], draughts_m: Mapping[str, float]) -> dict[str, float]:
@@ -52,18 +52,18 @@ def loads_beside(
         By log, m, of those whose draught is known.
     """
     began: dict[str, int] = {}
-    for _, one in in_order(own):
-        began.setdefault(one.log_id, one.start_utc_ns)
-    known = loads(list(began), own_draughts_m)
-    found, first = dict(known), next(iter(began))
+    for _, stretch in in_order(own):
+        began.setdefault(stretch.log_id, stretch.start_utc_ns)
+    own_loads = loads(list(began), own_draughts_m)
+    load, first = dict(own_loads), next(iter(began))
     by_draughts = all(log_id in own_draughts_m for log_id in began)
     for _, other in in_order(others):
-        if other.log_id in found:
+        if other.log_id in load:
             continue
         if by_draughts and other.log_id in other_draughts_m:
             both = {first: own_draughts_m[first], other.log_id: other_draughts_m[other.log_id]}
-            found[other.log_id] = loads([first, other.log_id], both)[other.log_id]
+            load[other.log_id] = loads([first, other.log_id], both)[other.log_id]
         else:
             before = [log_id for log_id, start in began.items() if start <= other.start_utc_ns]
-            found[other.log_id] = known[before[-1] if before else first]
-    return found
+            load[other.log_id] = own_loads[before[-1] if before else first]
+    return load

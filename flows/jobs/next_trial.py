@@ -111,7 +111,7 @@ class NextTrial:
             "parameter": self.parameter,
             "models": [{"parameter_set_id": name, "effects": list(own)} for name, own in self.models.items()],
             "speed_m_s": self.speed_m_s,
-            "trials": [_show(one) for one in self.trials],
+            "trials": [_show(trial) for trial in self.trials],
             "order": self.order(),
             "expected": self.predicted.show()["figures"],
             "sentences": self.sentences(),
@@ -146,41 +146,43 @@ class NextTrial:
         """Return what is to be parted, in words: by the effects that not all models have."""
         shared = set.intersection(*(set(own) for own in self.models.values()))
         own = [" + ".join(name for name in effects if name not in shared) for effects in self.models.values()]
-        return f"the {len(own)} models that fit alike ({' or '.join(one or 'none beside' for one in own)})"
+        return f"the {len(own)} models that fit alike ({' or '.join(names or 'none beside' for names in own)})"
 
     def sentences(self) -> list[str]:
         """Return what was found, the answer first."""
         best = self.trials[0]
         name = "{:g}/{:g}".format(*best.angles_deg)
-        said = []
+        sentences = []
         if self.parting:
             alike, sure = self._alike(), best.probability or 0.0
             if sure >= _SURE:
-                said.append(
+                sentences.append(
                     f"One zigzag {name} more parts {alike} with a probability of {_percent(sure)}, whichever is true."
                 )
             else:
-                said.append(
+                sentences.append(
                     f"None of the {len(self.trials)} zigzags parts {alike} with a probability of {_percent(_SURE)}; "
                     f"the best, {name}, with {_percent(sure)}. Sail it more than once, or a turning circle, by which "
                     "models are compared (`kempf predict --compare`)."
                 )
-            said.append("The probability holds where one of the models is the whole truth; where neither is, less.")
+            sentences.append(
+                "The probability holds where one of the models is the whole truth; where neither is, less."
+            )
         elif self.parameter is not None:
             share = best.narrowed[self.parameter]
             times = best.times_to_halve
-            said.append(
+            sentences.append(
                 f"One zigzag {name} more brings the standard error of {self.parameter} to {100 * share:.0f} % of what "
                 f"it is; {_halving(times)}."
             )
         else:
-            said.append(
+            sentences.append(
                 f"One zigzag {name} more brings the standard errors of the {len(best.narrowed)} parameters to "
                 f"{100 * best.mean_narrowed:.0f} % of what they are, their geometric mean; all trials are below."
             )
         if best.beyond:
-            said.append("Its rudder goes beyond what was sailed: what is expected of it is extrapolated.")
-        return [*said, *self.remarks]
+            sentences.append("Its rudder goes beyond what was sailed: what is expected of it is extrapolated.")
+        return [*sentences, *self.remarks]
 
 
 def next_trial(
@@ -223,16 +225,16 @@ def next_trial(
     trials = []
     for done, angles in enumerate(ANGLES_DEG):
         progress(done, len(ANGLES_DEG), "sailing zigzag {:g}/{:g}".format(*angles))
-        made = _trial(angles, models, hers.basis.logs.rudder_rad, parameter, of_ship)
-        if made is not None:
-            trials.append(made)
+        trial = _trial(angles, models, hers.basis.logs.rudder_rad, parameter, of_ship)
+        if trial is not None:
+            trials.append(trial)
     if not trials:
         raise DataRejected(
             "predicts_no_ship",
             f"By {hers.parameter_set.parameter_set_id} she runs away in every one of the {len(ANGLES_DEG)} zigzags.",
             "Choose another set with --set; `kempf params list` names them.",
         )
-    trials.sort(key=lambda one: _rank(one, parameter))
+    trials.sort(key=lambda trial: _rank(trial, parameter))
     predicted = predict_with(hers, replace(request, angles_deg=trials[0].angles_deg), progress)
     effects = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
     remarks = (
@@ -242,10 +244,10 @@ def next_trial(
     return NextTrial(vessel, hers.parameter_set, effects, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
 
 
-def _rank(one: Trial, parameter: str | None) -> float:
+def _rank(trial: Trial, parameter: str | None) -> float:
     if parameter is not None:
-        return one.narrowed[parameter]
-    return one.mean_narrowed if one.probability is None else -one.probability
+        return trial.narrowed[parameter]
+    return trial.mean_narrowed if trial.probability is None else -trial.probability
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,18 +271,18 @@ class _Model:
         return replace(filtered, run=as_predicted(filtered, self.point))
 
 
-def _model(one: BoundRuns, identified: Identified) -> _Model:
-    covariance = covariance_of(one.parameter_set, one.names)
+def _model(bound_runs: BoundRuns, identified: Identified) -> _Model:
+    covariance = covariance_of(bound_runs.parameter_set, bound_runs.names)
     index = np.flatnonzero(np.diag(covariance) > 0.0)
     levels: Float = np.mean(
-        [each.levels.own for each in one.runs if not each.held_out] or [one.runs[0].levels.own], axis=0
+        [each.levels.own for each in bound_runs.runs if not each.held_out] or [bound_runs.runs[0].levels.own], axis=0
     )
     return _Model(
         identified,
-        max((each.filtered for each in one.runs), key=lambda each: each.run.measured.shape[0]),
-        Point(one.hull, one.values, levels),
+        max((each.filtered for each in bound_runs.runs), key=lambda each: each.run.measured.shape[0]),
+        Point(bound_runs.hull, bound_runs.values, levels),
         Known(tuple(index.tolist()), covariance[np.ix_(index, index)]),
-        tuple(one.names[k] for k in index),
+        tuple(bound_runs.names[k] for k in index),
     )
 
 
@@ -326,17 +328,17 @@ def _trial(
     )
 
 
-def _show(one: Trial) -> dict[str, Any]:
+def _show(trial: Trial) -> dict[str, Any]:
     return {
-        "manoeuvre": {"kind": "zigzag", "heading_deg": one.angles_deg[0], "rudder_deg": one.angles_deg[1]},
-        "duration_s": one.duration_s,
-        "sea_room_m": list(one.sea_room_m),
-        "probability": one.probability,
-        "parts": [{"true": a, "other": b, "probability": p} for (a, b), p in one.parts.items()],
-        "narrowed": one.narrowed,
-        "mean_narrowed": one.mean_narrowed,
-        "times_to_halve": one.times_to_halve,
-        "beyond_what_was_sailed": one.beyond,
+        "manoeuvre": {"kind": "zigzag", "heading_deg": trial.angles_deg[0], "rudder_deg": trial.angles_deg[1]},
+        "duration_s": trial.duration_s,
+        "sea_room_m": list(trial.sea_room_m),
+        "probability": trial.probability,
+        "parts": [{"true": a, "other": b, "probability": p} for (a, b), p in trial.parts.items()],
+        "narrowed": trial.narrowed,
+        "mean_narrowed": trial.mean_narrowed,
+        "times_to_halve": trial.times_to_halve,
+        "beyond_what_was_sailed": trial.beyond,
     }
 
 

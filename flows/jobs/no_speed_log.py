@@ -96,8 +96,8 @@ def estimate_of(
     """
     settings, (own,) = dict(inputs.settings), inputs.bounds
     # in still water the speed over ground is that through the water, whatever the engine does
-    asked = spec.current != "none"
-    if asked:
+    in_current = spec.current != "none"
+    if in_current:
         companions.check_engine(instruments[own.log_id], own.start_utc_ns, own.end_utc_ns)
     no_log = dict(settings.pop(KEY))
     if no_log["trial_speed_m_s"] is None and profile.trial_speed_m_s is not None:
@@ -105,14 +105,14 @@ def estimate_of(
     beside, refused = [], []
     for bounds in inputs.companions:
         try:
-            if asked:
+            if in_current:
                 companions.check_engine(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
             beside.append(make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns))
         except KempfError as error:
             refused.append(error.code)
     result = estimate_without_log(record, spec, arm_per_m, settings, no_log, tuple(beside))
     if refused:
-        said = f"{len(refused)} of {len(inputs.companions)} other manoeuvres cannot be used: {', '.join(refused)}"
+        warning = f"{len(refused)} of {len(inputs.companions)} other manoeuvres cannot be used: {', '.join(refused)}"
         result.report["speed"]["companions_refused"] = refused
-        return replace(result, warnings=(*result.warnings, said))
+        return replace(result, warnings=(*result.warnings, warning))
     return result

@@ -33,9 +33,13 @@ def unread(warehouse: Warehouse, rows: Sequence[LogRow], profiles: Mapping[str, 
 def unsearched(warehouse: Warehouse, rows: Sequence[LogRow]) -> list[LogRow]:
     """Return those of some logs that were looked through by other code or with other corrections, or never."""
     code = code_of(warehouse, "segment")
-    known = examinations.codes(warehouse, [row.ingest_id for row in rows], {row.vessel for row in rows})
-    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
-    return [row for row in rows if known.get(row.ingest_id) != corrections.basis(code, said.get(row.log_id, ()))]
+    bases = examinations.codes(warehouse, [row.ingest_id for row in rows], {row.vessel for row in rows})
+    corrections_by_log = corrections.of_logs(warehouse, [row.log_id for row in rows])
+    return [
+        row
+        for row in rows
+        if bases.get(row.ingest_id) != corrections.basis(code, corrections_by_log.get(row.log_id, ()))
+    ]
 
 
 def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:

@@ -30,13 +30,13 @@ class Waiting:
         #: by vessel and alias
         self.aliases: dict[tuple[str, str], str] = {}
 
-    def keep(self, made: Sequence[ParameterSet]) -> None:
+    def keep(self, sets: Sequence[ParameterSet]) -> None:
         """Take new sets."""
-        self.sets.extend(made)
+        self.sets.extend(sets)
         if len(self.sets) >= _SETS_A_COMMIT:
             # what cannot be stored is not tried again on the way out
-            made, self.sets = self.sets, []
-            parameter_sets.insert(self._warehouse, made)
+            sets, self.sets = self.sets, []
+            parameter_sets.insert(self._warehouse, sets)
 
     def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
         """Return the set that an alias points to, or will, as it is stored; None where that set is lost."""
@@ -44,9 +44,9 @@ class Waiting:
         name = self.aliases.get((self._vessel, alias), stored)
         if name is None:
             return None
-        made = next((one for one in self.sets if one.parameter_set_id == name), None)
-        if made is not None:
-            return made
+        new_set = next((parameter_set for parameter_set in self.sets if parameter_set.parameter_set_id == name), None)
+        if new_set is not None:
+            return new_set
         try:
             return parameter_sets.as_stored(self._warehouse, name, self._vessel)
         except NotFound:
@@ -84,6 +84,6 @@ def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
 
 def store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
     """Store what waits of several vessels, in one commit a table."""
-    parameter_sets.insert(warehouse, [made for one in lists for made in one.sets])
+    parameter_sets.insert(warehouse, [parameter_set for waiting_list in lists for parameter_set in waiting_list.sets])
     # behind the sets: an alias never points to what is not there
-    aliases.point_all(warehouse, {key: name for one in lists for key, name in one.aliases.items()})
+    aliases.point_all(warehouse, {key: name for waiting_list in lists for key, name in waiting_list.aliases.items()})

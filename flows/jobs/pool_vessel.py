@@ -92,14 +92,14 @@ def pool_segments(
     chosen = poolable(warehouse, vessel, request, outcomes)
     if isinstance(chosen, str):
         return None
-    made, is_new = store_up_to_date(
+    parameter_set, is_new = store_up_to_date(
         *(warehouse, chosen, request.spec, request.own, progress, flow_run),
         search=dict(request.settings),
         keep=new.keep,
     )
-    if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
-        new.point(made.parameter_set_id)
-    return made, is_new
+    if parameter_set.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
+        new.point(parameter_set.parameter_set_id)
+    return parameter_set, is_new
 
 
 def not_pooled(

@@ -62,12 +62,12 @@ def models_of_set(
 ) -> ModelsOfSet:
     """Return the models of the set that is asked for, at the speed that is asked for; errors are `predict_vessel`'s."""
     required(request)
-    one, _ = chosen_set(warehouse, vessel, request.set_id)
-    basis = basis_of(warehouse, one, progress)
+    parameter_set, _ = chosen_set(warehouse, vessel, request.set_id)
+    basis = basis_of(warehouse, parameter_set, progress)
     speed = request.speed_m_s or basis.approach_m_s
-    rivals = rivals_of(warehouse, one, progress)
-    models = tuple(identified(ship_of_set(warehouse, each, speed), basis) for each in (one, *rivals.sets))
-    return ModelsOfSet(vessel, one, basis, speed, models, rivals.remarks)
+    rivals = rivals_of(warehouse, parameter_set, progress)
+    models = tuple(identified(ship_of_set(warehouse, each, speed), basis) for each in (parameter_set, *rivals.sets))
+    return ModelsOfSet(vessel, parameter_set, basis, speed, models, rivals.remarks)
 
 
 def predict_with(
@@ -79,8 +79,10 @@ def predict_with(
     if request.rudder_rate is not None:
         models = [replace(model, rudder_rate=request.rudder_rate) for model in models]
     progress(0, 1, f"sailing {len(models) * count} ships")
-    made = predict(models, manoeuvre_of(request), basis.logs, basis.profile.length_m, count)
+    prediction = predict(models, manoeuvre_of(request), basis.logs, basis.profile.length_m, count)
     progress(1, 1, "sailed")
     assumed = (*assumed_by(request, basis, models, hers.speed_m_s), *hers.remarks)
-    one = hers.parameter_set
-    return Predicted(hers.vessel, one, basis, hers.speed_m_s, made, assumed, limits_of(made, one))
+    parameter_set = hers.parameter_set
+    return Predicted(
+        hers.vessel, parameter_set, basis, hers.speed_m_s, prediction, assumed, limits_of(prediction, parameter_set)
+    )

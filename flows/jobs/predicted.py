@@ -47,29 +47,29 @@ class Predicted:
 
     def show(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
-        made, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
+        prediction, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
         return {
             "vessel": self.vessel,
             "parameter_set_id": self.parameter_set.parameter_set_id,
-            "manoeuvre": _manoeuvre_json(made.manoeuvre),
+            "manoeuvre": _manoeuvre_json(prediction.manoeuvre),
             "speed_m_s": self.speed_m_s,
-            "figures": _grouped({name: vars(figure) for name, figure in made.figures.items()}),
+            "figures": _grouped({name: vars(figure) for name, figure in prediction.figures.items()}),
             "models": [
                 {
-                    "parameter_set_id": one.model.name,
-                    "effects": [effect.name for effect in one.model.waters.model.effects],
-                    "figures": _grouped({name: vars(figure) for name, figure in one.figures.items()}),
-                    "draws": len(one.drawn) + one.no_ships,
-                    "no_ships": one.no_ships,
-                    "errors_widened": one.model.widened,
-                    "fitted_to_legs": one.model.fitted_to_legs,
-                    "brought_to_own_zigzags": one.model.conditioned,
+                    "parameter_set_id": member.model.name,
+                    "effects": [effect.name for effect in member.model.waters.model.effects],
+                    "figures": _grouped({name: vars(figure) for name, figure in member.figures.items()}),
+                    "draws": len(member.drawn) + member.no_ships,
+                    "no_ships": member.no_ships,
+                    "errors_widened": member.model.widened,
+                    "fitted_to_legs": member.model.fitted_to_legs,
+                    "brought_to_own_zigzags": member.model.conditioned,
                 }
-                for one in made.models
+                for member in prediction.models
             ],
-            "extrapolated": [{**vars(one), "sentence": one.sentence} for one in made.extrapolated],
-            "imo": [vars(one) for one in made.imo],
-            "unstable_on_a_straight_course": made.share_unstable,
+            "extrapolated": [{**vars(quantity), "sentence": quantity.sentence} for quantity in prediction.extrapolated],
+            "imo": [vars(criterion) for criterion in prediction.imo],
+            "unstable_on_a_straight_course": prediction.share_unstable,
             "surge": {
                 "time_constant_lengths": float(surge.best[0]),
                 "loss_by_drift_and_turn": float(surge.best[1]),
@@ -79,9 +79,9 @@ class Predicted:
                 "std": [float(x) for x in surge.std],
             },
             "rudder_rate_deg_s": {
-                "value": degrees(made.models[0].model.rudder_rate.rad_s),
-                "std": degrees(made.models[0].model.rudder_rate.std_rad_s),
-                "executes": made.models[0].model.rudder_rate.executes,
+                "value": degrees(prediction.models[0].model.rudder_rate.rad_s),
+                "std": degrees(prediction.models[0].model.rudder_rate.std_rad_s),
+                "executes": prediction.models[0].model.rudder_rate.executes,
             },
             "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
             "assumed": list(self.assumed),
@@ -91,79 +91,87 @@ class Predicted:
 
 def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identified], speed: float) -> tuple[str, ...]:
     """Return what a prediction takes for granted, sentences."""
-    said = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
+    sentences = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
-        said.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
+        sentences.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
     rate = request.rudder_rate or basis.rudder_rate
     if request.rudder_rate is not None:
-        said.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
+        sentences.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
     if rate.executes:
-        said.append(f"the rudder goes over at {degrees(rate.rad_s):.3g} deg/s, as in {rate.executes} executes")
-    said += [word for word in (rate.remark, *basis.surge.remarks) if word]
+        sentences.append(f"the rudder goes over at {degrees(rate.rad_s):.3g} deg/s, as in {rate.executes} executes")
+    sentences += [word for word in (rate.remark, *basis.surge.remarks) if word]
     if not all("speed_through_water" in run.channels for run in basis.runs.runs):
-        said.append("the speed in turns is the one over ground along the bow where no log shows that through the water")
+        sentences.append(
+            "the speed in turns is the one over ground along the bow where no log shows that through the water"
+        )
     if not all("shaft_speed" in run.channels for run in basis.runs.runs):
-        said.append("no shaft speed in the logs: taken as constant in them")
+        sentences.append("no shaft speed in the logs: taken as constant in them")
     for model in models:
         if model.fitted_to_legs:
-            said.append(
+            sentences.append(
                 f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
                 "predict them worse"
             )
         if model.widened > _SAID and model.fitted_to_legs:
-            said.append(
+            sentences.append(
                 f"errors of {model.name} widened {model.widened:.1f} times: so much worse it predicts a manoeuvre that "
                 "is left out"
             )
         elif model.widened > _SAID:
-            said.append(
+            sentences.append(
                 f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
                 "as those of a model that lacks something do"
             )
     for effect in {e.name: e for model in models for e in model.waters.model.effects}.values():
-        taken = dict.fromkeys(_TAKEN[c] for c in effect.needs if c in _TAKEN)
-        if taken:
-            said.append(f"{effect.name}: {', '.join(taken)}")
+        words = dict.fromkeys(_TAKEN[c] for c in effect.needs if c in _TAKEN)
+        if words:
+            sentences.append(f"{effect.name}: {', '.join(words)}")
         elif effect.terms and set(effect.terms) <= _INSTRUMENTS:
-            said.append(f"{effect.name} is in the instruments and does not move the ship")
-    return tuple(said)
+            sentences.append(f"{effect.name} is in the instruments and does not move the ship")
+    return tuple(sentences)
 
 
-def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+def limits_of(prediction: Prediction, parameter_set: ParameterSet) -> tuple[str, ...]:
     """Return what limits a prediction, sentences."""
-    said = []
-    if made.no_ships:
-        count = made.no_ships + len(made.drawn)
-        said.append(f"{made.no_ships} of {count} ships that the errors allow do not sail it and are in no interval")
-    for model in made.run_away:
-        said.append(f"{model.title} fits the logs as well, but its ships run away here: that model is in no interval")
-    if made.share_unstable >= 0.05:
-        said.append(f"unstable on a straight course with a probability of {100.0 * made.share_unstable:.0f} %")
-    if not one.convergence.get("converged"):
-        said.append(f"the set did not converge: {one.convergence.get('reason')}")
-    return tuple(said)
+    sentences = []
+    if prediction.no_ships:
+        count = prediction.no_ships + len(prediction.drawn)
+        sentences.append(
+            f"{prediction.no_ships} of {count} ships that the errors allow do not sail it and are in no interval"
+        )
+    for model in prediction.run_away:
+        sentences.append(
+            f"{model.title} fits the logs as well, but its ships run away here: that model is in no interval"
+        )
+    if prediction.share_unstable >= 0.05:
+        sentences.append(
+            f"unstable on a straight course with a probability of {100.0 * prediction.share_unstable:.0f} %"
+        )
+    if not parameter_set.convergence.get("converged"):
+        sentences.append(f"the set did not converge: {parameter_set.convergence.get('reason')}")
+    return tuple(sentences)
 
 
 def _manoeuvre_json(manoeuvre: Manoeuvre) -> dict[str, Any]:
-    found: dict[str, Any] = {"kind": manoeuvre.name}
+    content: dict[str, Any] = {"kind": manoeuvre.name}
     if isinstance(manoeuvre, Zigzag):
-        found["heading_deg"] = round(degrees(manoeuvre.heading_rad), 9)
-    found["rudder_deg"] = round(degrees(manoeuvre.rudder_rad), 9)  # type: ignore[attr-defined]
+        content["heading_deg"] = round(degrees(manoeuvre.heading_rad), 9)
+    content["rudder_deg"] = round(degrees(manoeuvre.rudder_rad), 9)  # type: ignore[attr-defined]
     side = getattr(manoeuvre, "side", None)
     if side is not None:
-        found["side"] = "starboard" if side > 0 else "port"
+        content["side"] = "starboard" if side > 0 else "port"
     if isinstance(manoeuvre, Spiral):
-        found["orders_deg"] = [round(degrees(angle), 9) for angle in manoeuvre.orders_rad]
-    return found
+        content["orders_deg"] = [round(degrees(angle), 9) for angle in manoeuvre.orders_rad]
+    return content
 
 
 def _grouped(figures: dict[str, Any]) -> dict[str, Any]:
     """Return figures by name, those with a number behind it as a list."""
-    found: dict[str, Any] = {}
+    groups: dict[str, Any] = {}
     for name, figure in figures.items():
         base, dot, _ = name.partition(".")
         if dot:
-            found.setdefault(base, []).append(figure)
+            groups.setdefault(base, []).append(figure)
         else:
-            found[base] = figure
-    return found
+            groups[base] = figure
+    return groups

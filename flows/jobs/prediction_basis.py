@@ -67,7 +67,7 @@ class Basis:
         return float(np.mean([run.approach_m_s for run in self.runs.runs]))
 
 
-def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silent) -> Basis:
+def basis_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progress = silent) -> Basis:
     """Return what the manoeuvres of a set say beside it.
 
     Raises
@@ -75,11 +75,11 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     NotFound
         ``logs_of_set_gone``: none of its logs is there any more, ``no_runs``.
     """
-    inputs: dict[str, Any] = dict(one.provenance.get("inputs") or {})
-    rows = {row.log_id: row.ingest_id for row in logs.current(warehouse, one.vessel)}
+    inputs: dict[str, Any] = dict(parameter_set.provenance.get("inputs") or {})
+    rows = {row.log_id: row.ingest_id for row in logs.current(warehouse, parameter_set.vessel)}
     every = list(inputs.get("segments", ()))
     # a pooled set names its segments in the order of the bounds
-    names = one.settings.get("segments") or [f"{b['log_id'][:8]}-{k}" for k, b in enumerate(every)]
+    names = parameter_set.settings.get("segments") or [f"{b['log_id'][:8]}-{k}" for k, b in enumerate(every)]
     bounds = [
         (name, Bounds(b["log_id"], b["start_utc_ns"], b["end_utc_ns"]))
         for name, b in zip(names, every, strict=True)
@@ -88,18 +88,18 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     if not bounds:
         raise NotFound(
             "logs_of_set_gone",
-            f"None of the logs that {one.parameter_set_id} was identified from is in the warehouse.",
+            f"None of the logs that {parameter_set.parameter_set_id} was identified from is in the warehouse.",
             "Ingest them again: the speed in turns and the rudder's rate are read from them.",
         )
-    wanted = list(dict.fromkeys(each.log_id for _, each in bounds))
+    log_ids = list(dict.fromkeys(each.log_id for _, each in bounds))
     instruments = {}
-    for done, log_id in enumerate(wanted):
-        progress(done, len(wanted), "reading the logs of the set")
+    for done, log_id in enumerate(log_ids):
+        progress(done, len(log_ids), "reading the logs of the set")
         instruments[log_id] = channels_of(warehouse, rows[log_id])
     profile = vessels.get(warehouse, str(inputs["profile_sha256"]))
     laden = loads_of_logs(bounds, inputs.get("draughts_m", {}))
-    runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(one.model_spec)), laden=laden)
-    scale = profile.length_m or _scale_m(one)
+    runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(parameter_set.model_spec)), laden=laden)
+    scale = profile.length_m or _scale_m(parameter_set)
     surge = surge_of(runs.runs, scale, runs.spec.rudder_speed_exponent)
     return Basis(profile, runs, dict(bounds), surge, rudder_rate(runs.records), covered(runs.runs, scale), scale)
 
@@ -112,11 +112,12 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     DataRejected
         ``set_without_covariance``.
     """
-    one, effects = ship.parameter_set, ship.effects
+    parameter_set, effects = ship.parameter_set, ship.effects
     if not np.all(np.isfinite(ship.covariance)):
         raise DataRejected(
             "set_without_covariance",
-            f"{one.parameter_set_id} ({one.estimator}) has no covariance of all its parameters: there is no interval.",
+            f"{parameter_set.parameter_set_id} ({parameter_set.estimator}) has no covariance of all its parameters: "
+            "there is no interval.",
             "Predict with a set of `kempf identify`, which has one; `kempf params list` names them.",
         )
     waters = Waters(
@@ -131,13 +132,13 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     )
     values = effects.values if effects is not None else np.zeros(0)
     hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0
-    legs = fitted_to_legs(one)
+    legs = fitted_to_legs(parameter_set)
     if legs is None:
-        factor = _widened(one, waters.model, basis, hull, values, covariance)
+        factor = _widened(parameter_set, waters.model, basis, hull, values, covariance)
     else:
         hull, values, covariance, factor = legs
     return Identified(
-        name=one.parameter_set_id,
+        name=parameter_set.parameter_set_id,
         waters=waters,
         hull=hull,
         effects=values,
@@ -150,21 +151,21 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
 
 
 def _widened(
-    one: ParameterSet, model: EffectModel, basis: Basis, hull: Float, values: Float, covariance: Float
+    parameter_set: ParameterSet, model: EffectModel, basis: Basis, hull: Float, values: Float, covariance: Float
 ) -> float:
     """Return how much wider than its covariance the errors of a pooled set are; 1 for a set of one manoeuvre."""
-    levels: dict[str, Any] = dict(one.convergence.get("levels") or {})
-    gross: dict[str, Any] = dict(one.convergence.get("gross_error_instants_s") or {})
+    levels: dict[str, Any] = dict(parameter_set.convergence.get("levels") or {})
+    gross: dict[str, Any] = dict(parameter_set.convergence.get("gross_error_instants_s") or {})
     fitted = [run for run in basis.runs.runs if run.name in levels]
     filters = [RunFilter(left_out(run, gross.get(run.name, {})), model, basis.runs.spec) for run in fitted]
     own = [np.exp(np.array(levels[run.name], dtype=np.float64)) for run in fitted]
     # a covariance that is wider already by what the runs disagree about is counted twice in it
-    pooling: dict[str, Any] = dict(one.convergence.get("pooling") or {})
-    already = float(one.convergence.get("widened") or pooling.get("widened") or 1.0)
+    pooling: dict[str, Any] = dict(parameter_set.convergence.get("pooling") or {})
+    already = float(parameter_set.convergence.get("widened") or pooling.get("widened") or 1.0)
     return max(widening(filters, own, hull, values, covariance) / already**2, 1.0) if filters else 1.0
 
 
-def _scale_m(one: ParameterSet) -> float:
+def _scale_m(parameter_set: ParameterSet) -> float:
     """Return the length of a ship who answers as she does: of usual hulls a22 is about -2.5 / L."""
-    damping = next((abs(p.value) for p in one.parameters if p.name == "a22"), 0.0)
+    damping = next((abs(p.value) for p in parameter_set.parameters if p.name == "a22"), 0.0)
     return float(min(max(2.5 / damping if damping > 0.0 else LENGTH_M, 0.3), 500.0))

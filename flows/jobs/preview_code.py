@@ -73,7 +73,7 @@ class VesselPreview:
             "up_to_date": self.up_to_date,
             "identical": self.identical,
             "moved": len({move.parameter_set_id for move in self.moves}),
-            "new": [one.show() for one in self.new],
+            "new": [new_set.show() for new_set in self.new],
             "gone": list(self.gone),
             "logs": self.logs,
             "logs_otherwise": list(self.logs_otherwise),
@@ -135,7 +135,7 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     same = _built_again(warehouse, old)
     old = [stored for stored in old if stored.parameter_set_id not in same]
     # in the other warehouse nothing is there to be brought forward: all manoeuvres are fitted at once
-    now = [made for made in now if (made.model_sha256, made.estimator) not in same.values()]
+    now = [stored for stored in now if (stored.model_sha256, stored.estimator) not in same.values()]
     there = set(parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list())
     pairs = paired(old, now)
     return VesselPreview(
@@ -154,7 +154,7 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
 
 def _built_again(warehouse: Warehouse, old: Sequence[ParameterSet]) -> dict[str, tuple[str, str]]:
     """Return model and estimator, by id, of sets that rest on others and are built again with these, bit for bit."""
-    found = {}
+    models = {}
     for stored in old:
         if stored.updates is None:
             continue
@@ -163,8 +163,8 @@ def _built_again(warehouse: Warehouse, old: Sequence[ParameterSet]) -> dict[str,
         except KempfError:
             continue  # compared with what comes of all manoeuvres, like any other set
         if {again.verdict, *again.rests_on.values()} == {"bit-identical"}:
-            found[stored.parameter_set_id] = stored.model_sha256, stored.estimator
-    return found
+            models[stored.parameter_set_id] = stored.model_sha256, stored.estimator
+    return models
 
 
 def standing_sets(warehouse: Warehouse, vessel: str) -> list[ParameterSet]:
@@ -184,7 +184,7 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
     """Put into an empty warehouse what reprocessing starts from: profiles, logs, corrections, sets, aliases."""
     failures = []
     versions = vessel_table.versions(warehouse, vessel)
-    vessel_table.register_all(scratch, [(vessel, one.profile) for one in versions])
+    vessel_table.register_all(scratch, [(vessel, version.profile) for version in versions])
     kept = []
     for row in logs.current(warehouse, vessel):
         try:
@@ -195,8 +195,8 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
         except KempfError as error:
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
-    for one in corrections.all_of(warehouse, [row.log_id for row in kept]):
-        corrections.add(scratch, one.log_id, one.segment_id, one.correction)
+    for correction in corrections.all_of(warehouse, [row.log_id for row in kept]):
+        corrections.add(scratch, correction.log_id, correction.segment_id, correction.correction)
     # those that no longer stand, too: their models are brought up to date with the others
     parameter_sets.insert(scratch, parameter_sets.all_as_stored(warehouse, vessel))
     for alias, name in aliases.of_vessel(warehouse, vessel).items():
@@ -207,13 +207,13 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
 def _otherwise(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> tuple[str, ...]:
     """Return the names of logs in which something else was read or found in the other warehouse, sorted."""
     there = {row.log_id: row for row in logs.current(scratch, vessel)}
-    found, found_there = _found_in(warehouse, vessel), _found_in(scratch, vessel)
+    findings, findings_there = _found_in(warehouse, vessel), _found_in(scratch, vessel)
     return tuple(
         sorted(
             row.file_name
             for row in logs.current(warehouse, vessel)
             if row.log_id not in there
-            or found[row.log_id] != found_there[row.log_id]
+            or findings[row.log_id] != findings_there[row.log_id]
             or not readings.read(warehouse, row.ingest_id).equals(readings.read(scratch, there[row.log_id].ingest_id))
         )
     )
@@ -231,8 +231,8 @@ def _found_in(warehouse: Warehouse, vessel: str) -> dict[str, str]:
     return {name: canonical_json(plain(content)) for name, content in by_log.items()}
 
 
-def _without_code(one: StoredExamination | Segment) -> dict[str, Any]:
-    return {key: value for key, value in vars(one).items() if key not in ("ingest_id", "code_version")}
+def _without_code(row: StoredExamination | Segment) -> dict[str, Any]:
+    return {key: value for key, value in vars(row).items() if key not in ("ingest_id", "code_version")}
 
 
 def _failure(what: str, error: KempfError) -> dict[str, Any]:

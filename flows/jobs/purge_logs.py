@@ -90,23 +90,27 @@ def purge(warehouse: Warehouse, name: str, reason: str) -> Purge:
 
 def _ingests(warehouse: Warehouse, row: LogRow) -> dict[str, list[str]]:
     """Return every ingest that there ever was of a log, by the vessel whose it was then."""
-    found: dict[str, list[str]] = {}
-    for one in logs.all_ingests(warehouse):
-        if one.log_id == row.log_id:
-            found.setdefault(one.vessel, []).append(one.ingest_id)
-    return found
+    ingests: dict[str, list[str]] = {}
+    for ingest in logs.all_ingests(warehouse):
+        if ingest.log_id == row.log_id:
+            ingests.setdefault(ingest.vessel, []).append(ingest.ingest_id)
+    return ingests
 
 
 def _diagnoses(warehouse: Warehouse, row: LogRow) -> dict[str, list[str]]:
     """Return the diagnoses that rest on a log, by vessel."""
     return {
-        vessel: [one.diagnosis_id for one in diagnoses.of_vessel(warehouse, vessel) if row.log_id in _logs_of(one)]
+        vessel: [
+            diagnosis.diagnosis_id
+            for diagnosis in diagnoses.of_vessel(warehouse, vessel)
+            if row.log_id in _logs_of(diagnosis)
+        ]
         for vessel in _ingests(warehouse, row)
     }
 
 
-def _logs_of(one: diagnoses.StoredDiagnosis) -> set[str]:
-    return {bounds["log_id"] for bounds in one.inputs.get("segments", ())}
+def _logs_of(diagnosis: diagnoses.StoredDiagnosis) -> set[str]:
+    return {bounds["log_id"] for bounds in diagnosis.inputs.get("segments", ())}
 
 
 def _rows(warehouse: Warehouse, table: str, column: str, values: Mapping[str, list[str]]) -> int:

@@ -132,7 +132,7 @@ def _read_anew(
     from kempf.flows.jobs.spool import spooled
 
     failed: dict[str, KempfError] = {}
-    codes, said = codes_of(warehouse), corrections.of_logs(warehouse, [row.log_id for row in rows])
+    codes, corrections_by_log = codes_of(warehouse), corrections.of_logs(warehouse, [row.log_id for row in rows])
     for chunk in _chunks(rows):
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
@@ -143,7 +143,7 @@ def _read_anew(
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
                     read[row.ingest_id] = look_through(
-                        row.vessel, row.file_name, log, profile, readings, said.get(row.log_id, ()), codes
+                        row.vessel, row.file_name, log, profile, readings, corrections_by_log.get(row.log_id, ()), codes
                     )
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = wrapped(error)
@@ -158,13 +158,13 @@ def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], begin: Callable[[
     from kempf.flows.jobs.search_log import search_again, store
 
     failed: dict[str, KempfError] = {}
-    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
+    corrections_by_log = corrections.of_logs(warehouse, [row.log_id for row in rows])
     for chunk in _chunks(rows):
         searched: dict[str, SearchedLog] = {}
         for row in chunk:
             begin(f"looking for manoeuvres in {row.file_name}")
             try:
-                searched[row.ingest_id] = search_again(warehouse, row, said.get(row.log_id, ()))
+                searched[row.ingest_id] = search_again(warehouse, row, corrections_by_log.get(row.log_id, ()))
             except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                 failed[row.ingest_id] = wrapped(error)
         failed |= together_or_each(searched, partial(store, warehouse))

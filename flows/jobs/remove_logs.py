@@ -37,12 +37,12 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
         ``no_reason``.
     """
     require_reason(reason)
-    found = of_logs(warehouse, rows)
+    following = of_logs(warehouse, rows)
     # first: once the logs count no longer the same command has nothing to go on with
-    if found.current:
-        aliases.withdraw(warehouse, found.vessel)
+    if following.current:
+        aliases.withdraw(warehouse, following.vessel)
     _mark(warehouse, rows, reason)
-    return found
+    return following
 
 
 def _mark(warehouse: Warehouse, rows: Sequence[LogRow], reason: str | None) -> None:
@@ -122,22 +122,22 @@ def move(
             {"log_id": row.log_id, "vessel": whose},
         )
     with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
-        said = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
-        read = look_through(whose, row.file_name, log, profile, readings, said, codes_of(warehouse))
+        log_corrections = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
+        read = look_through(whose, row.file_name, log, profile, readings, log_corrections, codes_of(warehouse))
         # first: once the log is hers the same command has nothing to go on with
         notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
         for segment_id in _noted_segments(warehouse, row):
             notes.carry(warehouse, "segment", segment_id, row.vessel, whose)
-        found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
+        following = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
-    return found, logs.by_prefix(warehouse, row.log_id)
+    return following, logs.by_prefix(warehouse, row.log_id)
 
 
 def _noted_segments(warehouse: Warehouse, row: LogRow) -> list[str]:
     """Return the manoeuvres of a log that notes of its vessel are on; their ids stay whosever the log is."""
-    names = {one.subject_id for one in notes.of_vessel(warehouse, row.vessel) if one.subject == "segment"}
-    found = segments.by_ids(warehouse, row.vessel, names) if names else {}
-    return sorted(name for name, one in found.items() if one.log_id == row.log_id)
+    names = {note.subject_id for note in notes.of_vessel(warehouse, row.vessel) if note.subject == "segment"}
+    by_id = segments.by_ids(warehouse, row.vessel, names) if names else {}
+    return sorted(name for name, segment in by_id.items() if segment.log_id == row.log_id)
 
 
 def _on_their_way(warehouse: Warehouse, vessel: str, to: str) -> list[LogRow]:
@@ -184,9 +184,9 @@ def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Following |
     require_reason(reason)
     vessels.require(warehouse, vessel)
     held = logs.current(warehouse, vessel)
-    found = remove(warehouse, held, reason) if held else None
+    following = remove(warehouse, held, reason) if held else None
     vessels.remove(warehouse, vessel, reason)
-    return found
+    return following
 
 
 def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> list[LogRow]:
@@ -211,10 +211,10 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
     """
     require_reason(reason)
     profile = vessels.current(warehouse, vessel)
-    known = vessels.profiles(warehouse)
+    profiles = vessels.profiles(warehouse)
     renamed = profile.model_copy(update={"vessel": name})
     # an interrupted one goes on: then the profile under the new name is the very same
-    if name == vessel or (name in known and known[name] != renamed):
+    if name == vessel or (name in profiles and profiles[name] != renamed):
         raise UsageError(
             "vessel_exists",
             f"There is a vessel {name!r} already.",

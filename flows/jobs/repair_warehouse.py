@@ -54,7 +54,7 @@ class Repaired:
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        return {"done": self.done, "lost": self.gone, "left": [one.show() for one in self.left]}
+        return {"done": self.done, "lost": self.gone, "left": [problem.show() for problem in self.left]}
 
 
 def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
@@ -65,35 +65,37 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     NotFound
         ``no_warehouse``.
     """
-    found = Repaired()
+    outcome = Repaired()
     if mend_marker(warehouse):
-        found.done.append("The file that marks the warehouse was written anew.")
+        outcome.done.append("The file that marks the warehouse was written anew.")
     warehouse.require()
-    _recall(warehouse, found)
+    _recall(warehouse, outcome)
     if warehouse.folder is not None:
         for name in TABLES:
             progress(0, 1, f"table {name}")
             try:
-                _table(warehouse, warehouse.folder / name, name, found)
+                _table(warehouse, warehouse.folder / name, name, outcome)
             except KempfError as error:  # the other tables are mended all the same
-                found.gone.append(f"the table {name}: {error.message}")
-    _profiles(warehouse, found)
-    _removed_again(warehouse, found)
-    _each(warehouse, found, progress, _missing_logs(warehouse, found), _taken_in)
-    _each(warehouse, found, progress, _unread_logs(warehouse, found), _read_again)
+                outcome.gone.append(f"the table {name}: {error.message}")
+    _profiles(warehouse, outcome)
+    _removed_again(warehouse, outcome)
+    _each(warehouse, outcome, progress, _missing_logs(warehouse, outcome), _taken_in)
+    _each(warehouse, outcome, progress, _unread_logs(warehouse, outcome), _read_again)
     describe_all(warehouse)
-    if not _unread_left(found):
+    if not _unread_left(outcome):
         warehouse.delete(*UNFINISHED)
-    found.left = verify(warehouse, lambda what: progress(0, 1, what))
-    found.gone += [f"{one.words} Ingest the original file again." for one in found.left if one.kind == "raw log"]
-    return found
+    outcome.left = verify(warehouse, lambda what: progress(0, 1, what))
+    outcome.gone += [
+        f"{problem.words} Ingest the original file again." for problem in outcome.left if problem.kind == "raw log"
+    ]
+    return outcome
 
 
-def _table(warehouse: Warehouse, folder: Path, name: str, found: Repaired) -> None:
+def _table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> None:
     """Put the log of a table back, and take its damaged files out."""
     if not folder.is_dir():
         return
-    found.done += seals.mend_log(folder, name)
+    outcome.done += seals.mend_log(folder, name)
     if not (folder / "_delta_log").is_dir():
         return
     table = delta.open_table(warehouse, name)
@@ -101,54 +103,56 @@ def _table(warehouse: Warehouse, folder: Path, name: str, found: Repaired) -> No
         return
     live = {Path(path) for path in table.file_uris()}
     every = live | {path for path in folder.rglob("*.parquet") if folder / "_delta_log" not in path.parents}
-    found.done += seals.mend_seals(folder, name, sorted(every))
+    outcome.done += seals.mend_seals(folder, name, sorted(every))
     bad = [path for path in sorted(every) if _is_bad(folder, name, path, live)]
     rows = _rows_by_file(table)
     for path in bad:
         if path in live:
             # first: where it ends here, the next repair goes on
-            _remember(warehouse, folder, path, name, found)
+            _remember(warehouse, folder, path, name, outcome)
         _put_aside(warehouse, folder, path)
         if path in live:
             count = rows.get(path.name)
-            said = f"{count} rows" if count is not None else "rows"
-            found.done.append(f"{name}/{path.relative_to(folder).as_posix()} was taken out of its table.")
+            amount = f"{count} rows" if count is not None else "rows"
+            outcome.done.append(f"{name}/{path.relative_to(folder).as_posix()} was taken out of its table.")
             if name not in _OF_LOGS and name != "logs":
-                found.gone.append(f"{said} of the table {name}{_AFTER.get(name, '')}")
+                outcome.gone.append(f"{amount} of the table {name}{_AFTER.get(name, '')}")
         else:
-            found.gone.append(f"what the table {name} held earlier in {path.name}; the newest version does not need it")
+            outcome.gone.append(
+                f"what the table {name} held earlier in {path.name}; the newest version does not need it"
+            )
     if any(path in live for path in bad):
         table.repair()
     seals.seal(table)
 
 
-def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, found: Repaired) -> None:
+def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, outcome: Repaired) -> None:
     """Note of whom a data file was, where the raw logs give it again, and keep that until it is done."""
     parts = dict(part.partition("=")[::2] for part in path.relative_to(folder).parts[:-1])
     if name == "logs":
-        found.registers = True
+        outcome.registers = True
     elif name not in _OF_LOGS:
         return
     elif "month" in parts:
-        found.months.add(f"{parts['vessel_key']} {parts['month']}")
+        outcome.months.add(f"{parts['vessel_key']} {parts['month']}")
     else:
-        found.vessel_keys.add(parts.get("vessel_key"))
+        outcome.vessel_keys.add(parts.get("vessel_key"))
     content = {
-        "months": sorted(found.months),
-        "vessel_keys": sorted(found.vessel_keys, key=str),
-        "registers": found.registers,
+        "months": sorted(outcome.months),
+        "vessel_keys": sorted(outcome.vessel_keys, key=str),
+        "registers": outcome.registers,
     }
     warehouse.write_bytes(json.dumps(content).encode(), *UNFINISHED)
 
 
-def _recall(warehouse: Warehouse, found: Repaired) -> None:
+def _recall(warehouse: Warehouse, outcome: Repaired) -> None:
     """Go on with what an earlier repair did not finish."""
     data = warehouse.read_bytes(*UNFINISHED)
     if data is not None:
         content = json.loads(data)
-        found.months |= set(content["months"])
-        found.vessel_keys |= set(content["vessel_keys"])
-        found.registers = bool(content["registers"])
+        outcome.months |= set(content["months"])
+        outcome.vessel_keys |= set(content["vessel_keys"])
+        outcome.registers = bool(content["registers"])
 
 
 _AFTER = {
@@ -200,7 +204,7 @@ def _put_aside(warehouse: Warehouse, folder: Path, path: Path) -> None:
 
 def _each(
     warehouse: Warehouse,
-    found: Repaired,
+    outcome: Repaired,
     progress: Progress,
     names: Sequence[str],
     mend: Callable[[Warehouse, str], str],
@@ -209,27 +213,27 @@ def _each(
     for done, name in enumerate(names):
         progress(done, len(names), f"log {name[:12]}")
         try:
-            found.done.append(mend(warehouse, name))
+            outcome.done.append(mend(warehouse, name))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-            found.gone.append(f"the log {name}: {wrapped(error).message}")
+            outcome.gone.append(f"the log {name}: {wrapped(error).message}")
 
 
-def _removed_again(warehouse: Warehouse, found: Repaired) -> None:
+def _removed_again(warehouse: Warehouse, outcome: Repaired) -> None:
     """Let logs count no longer of which it is kept beside them that they were removed, or that they are another's."""
-    if not found.registers:
+    if not outcome.registers:
         return
     for row in logs.current(warehouse):
         facts = raw.described(warehouse, row.log_id)
         if facts is not None and (facts.get("removed") or facts["vessel"] != row.vessel):
             reason = facts.get("removed") or f"moved to {facts['vessel']!r}"
             logs.mark(warehouse, [row.log_id], reason)
-            found.done.append(f"{row.file_name} of {row.vessel} counts no longer, as before: {reason}.")
+            outcome.done.append(f"{row.file_name} of {row.vessel} counts no longer, as before: {reason}.")
 
 
-def _missing_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
+def _missing_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:
     """Return the raw logs that should count, by what is kept beside them, and that no register lets count."""
     current = {row.log_id for row in logs.current(warehouse)}
-    known = current if found.registers else {row.log_id for row in logs.all_ingests(warehouse)}
+    known = current if outcome.registers else {row.log_id for row in logs.all_ingests(warehouse)}
     described = {name: raw.described(warehouse, name) for name in raw.kept(warehouse) if name not in known}
     return [name for name, facts in described.items() if facts is not None and not facts.get("removed")]
 
@@ -244,7 +248,7 @@ def _taken_in(warehouse: Warehouse, name: str) -> str:
     return f"{facts['file_name']} of {facts['vessel']} was taken in again from its raw bytes ({outcome.outcome})."
 
 
-def _profiles(warehouse: Warehouse, found: Repaired) -> None:
+def _profiles(warehouse: Warehouse, outcome: Repaired) -> None:
     """Register the profiles again that logs were read with and that are lost, those of later logs last."""
     known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
     rows = [*logs.removed(warehouse), *logs.current(warehouse)]
@@ -260,10 +264,10 @@ def _profiles(warehouse: Warehouse, found: Repaired) -> None:
     for vessel in sorted(removed):
         vessels.remove(warehouse, vessel, "her logs were removed")
     if lost:
-        found.done.append(f"Profiles were registered again: {', '.join(sorted({row.vessel for row in lost}))}.")
+        outcome.done.append(f"Profiles were registered again: {', '.join(sorted({row.vessel for row in lost}))}.")
 
 
-def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
+def _unread_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:
     """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
     code = code_of(warehouse, "ingest")
     rows = [row for row in logs.current(warehouse) if row.code_version == code]
@@ -272,30 +276,30 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
 
     def whole(row: LogRow) -> bool:
         key = vessel_key(row.vessel)
-        touched = f"{key} {month_of(row.start_utc_ns)}" in found.months
-        touched = touched or not found.vessel_keys.isdisjoint({None, key})
+        touched = f"{key} {month_of(row.start_utc_ns)}" in outcome.months
+        touched = touched or not outcome.vessel_keys.isdisjoint({None, key})
         return not touched and row.ingest_id in held and row.ingest_id in examined
 
     return [row.log_id for row in rows if not whole(row)]
 
 
-def _unread_left(found: Repaired) -> bool:
+def _unread_left(outcome: Repaired) -> bool:
     """Return whether a log that was to be read again could not be."""
-    return any(words.startswith("the log ") for words in found.gone)
+    return any(words.startswith("the log ") for words in outcome.gone)
 
 
 def _read_again(warehouse: Warehouse, name: str) -> str:
     """Read a log again and put all that its bytes give in place of what is stored of it."""
     row = logs.by_prefix(warehouse, name)
     profile = vessels.get(warehouse, row.profile_sha256)
-    said = corrections.of_logs(warehouse, [name]).get(name, ())
+    log_corrections = corrections.of_logs(warehouse, [name]).get(name, ())
     with raw.opened(warehouse, name) as log, spooled(row.file_name, log, profile) as read:
-        found = look_through(row.vessel, row.file_name, log, profile, read, said, codes_of(warehouse))
-        if found.found.examination.ingest_id != row.ingest_id:
+        read_log = look_through(row.vessel, row.file_name, log, profile, read, log_corrections, codes_of(warehouse))
+        if read_log.found.examination.ingest_id != row.ingest_id:
             raise KempfError(
                 "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}
             )
-        search_log.store(warehouse, [found.found])
+        search_log.store(warehouse, [read_log.found])
         batch = [(row, read)]
         readings.write(warehouse, batch)
         readings.write_rejected(warehouse, batch)

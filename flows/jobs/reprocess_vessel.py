@@ -191,11 +191,11 @@ class _Reprocessing:
         for ingest, error in refreshed.failed.items():
             report.fail(names[ingest], error)
         report.segments = len(segments.current(self.warehouse, work.vessel))
-        for one in work.requests if report.segments else ():
+        for request in work.requests if report.segments else ():
             outcomes = identify_segments(
                 self.warehouse,
                 work.vessel,
-                one,
+                request,
                 refreshed,
                 work.new,
                 adopt=False,
@@ -207,7 +207,7 @@ class _Reprocessing:
                     report.fail(outcome.segment.segment_id, outcome.error)
                 report.new_sets += outcome.new
                 report.kept_sets += outcome.set_id is not None and not outcome.new
-            self._pool(work, one, outcomes)
+            self._pool(work, request, outcomes)
 
     def _pool(self, work: _Work, request: Request, outcomes: list[IdentifyOutcome]) -> None:
         """Pool what was identified; that segments have nothing in common is no failure of the separate ones."""
@@ -234,7 +234,7 @@ class _Reprocessing:
         if work.report.segments and self.request is None:
             self._model(work)
         _withdraw(self.warehouse, work.vessel, work.report)
-        work.report.findings = [one.show() for one in quality_of(self.warehouse, work.vessel)]
+        work.report.findings = [finding.show() for finding in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
         """Bring her current model with effects up to date; where that fails it stays as it was."""
@@ -246,16 +246,16 @@ class _Reprocessing:
         if now is None:
             return
         spec, own = model_of(now)
-        if any(one.estimator == SINGLE and one.spec == spec for one in work.requests):
+        if any(request.estimator == SINGLE and request.spec == spec for request in work.requests):
             # identified and pooled just now
             return
         try:
             chosen = choose(self.warehouse, work.vessel, out_of_date(work.refreshed) if work.refreshed else {})
-            made, new = store_up_to_date(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
+            parameter_set, new = store_up_to_date(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
         except KempfError as error:
             work.report.fail(aliases.CURRENT, error)
             return
-        point(self.warehouse, made)
+        point(self.warehouse, parameter_set)
         work.report.new_sets += new
         work.report.kept_sets += not new
 
@@ -270,8 +270,8 @@ def _leave(warehouse: Warehouse, works: Sequence[_Work]) -> None:
     for work in sure:
         assert work.before is not None
         now = after[work.vessel]
-        made = len(set(now.set_ids) - set(work.before.set_ids))
-        if now.inputs == work.before.inputs and made == work.report.new_sets:
+        new_sets = len(set(now.set_ids) - set(work.before.set_ids))
+        if now.inputs == work.before.inputs and new_sets == work.report.new_sets:
             work.left = now.digest
 
 
@@ -279,16 +279,16 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     """Return every model and estimator that the vessel was ever identified with: all of them are kept up to date."""
     if default is not None:
         return [default]
-    asked: dict[str, Request] = {}
-    known = parameter_sets.models(warehouse, vessel)
-    for spec, estimator, own in known:
+    requests: dict[str, Request] = {}
+    models = parameter_sets.models(warehouse, vessel)
+    for spec, estimator, own in models:
         # a pooled set comes of the separate ones, one with effects is a model of all runs at once, and of an estimator
         # that an earlier version had the sets stay as they are
         if estimator not in NAMES:
             continue
         request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
-        asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [asked[key] for key in sorted(asked)] if known else [Request(default_model_of(warehouse, vessel))]
+        requests.setdefault(f"{request.spec.sha256} {request.estimator}", request)
+    return [requests[key] for key in sorted(requests)] if models else [Request(default_model_of(warehouse, vessel))]
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

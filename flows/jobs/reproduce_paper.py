@@ -209,8 +209,8 @@ def _experiment(factor: float) -> Experiment:
     record = make_record(_instruments(trial), *bounds)
     arm, spec = trial.truth.wind_arm_per_m, ModelSpec(name="paper", current="lateral")
     # all 25 iterations are made, as the paper's Fig. 2 shows them
-    given = PaperSettings(iterations=ITERATIONS, constant=True, run_on=True)
-    sampled, course = paper.run(record, spec, arm, given)
+    paper_settings = PaperSettings(iterations=ITERATIONS, constant=True, run_on=True)
+    sampled, course = paper.run(record, spec, arm, paper_settings)
     likely = maximum_likelihood.identify(record, spec, arm, MaximumLikelihoodSettings())
     truth = Hull(*(getattr(trial.truth.parameters, name) for name in HULL_PARAMETERS))
     since_start = (record.start_utc_ns - settings.start_utc_ns) / SECOND_NS

@@ -122,27 +122,27 @@ def verify_all(
         vessel_table.require(warehouse, vessel)
     listed = parameter_sets.summaries(warehouse).select("vessel", "parameter_set_id").rows()
     purged = _of_purged_logs(warehouse)
-    asked = [(vessel, name) for vessel, name in listed if not vessels or vessel in vessels]
-    out = tuple(name for _, name in asked if name in purged)
-    asked = [(vessel, name) for vessel, name in asked if name not in purged]
-    known = {} if afresh else {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
-    found: dict[str, RerunVerdict] = {}
-    for _, name in asked:
-        before = known.get(_run_id(name, tolerance))
+    pairs = [(vessel, name) for vessel, name in listed if not vessels or vessel in vessels]
+    out = tuple(name for _, name in pairs if name in purged)
+    pairs = [(vessel, name) for vessel, name in pairs if name not in purged]
+    by_id = {} if afresh else {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
+    by_name: dict[str, RerunVerdict] = {}
+    for _, name in pairs:
+        before = by_id.get(_run_id(name, tolerance))
         if before is not None:
-            found[name] = _remembered(before)
-    done = len(found)
-    for vessel, of_hers in groupby(asked, key=lambda pair: pair[0]):
-        names = [name for _, name in of_hers if name not in found]
+            by_name[name] = _remembered(before)
+    done = len(by_name)
+    for vessel, of_hers in groupby(pairs, key=lambda pair: pair[0]):
+        names = [name for _, name in of_hers if name not in by_name]
         for group in _groups(parameter_sets.all_as_stored(warehouse, vessel, names)):
-            progress(done, len(asked), f"{vessel}: building {len(group)} parameter sets again")
+            progress(done, len(pairs), f"{vessel}: building {len(group)} parameter sets again")
             verdicts = _verify(warehouse, group, tolerance)
             # what is finished is kept even if the next moment is the last
             runs.record_all(warehouse, [_as_run(v, tolerance) for v in verdicts if v.error is None])
-            found.update((v.parameter_set_id, v) for v in verdicts)
+            by_name.update((v.parameter_set_id, v) for v in verdicts)
             done += len(group)
-    progress(len(asked), len(asked), "done")
-    return Verification(tuple(found[name] for _, name in asked), out)
+    progress(len(pairs), len(pairs), "done")
+    return Verification(tuple(by_name[name] for _, name in pairs), out)
 
 
 def _of_purged_logs(warehouse: Warehouse) -> set[str]:
@@ -215,8 +215,8 @@ def _failed(stored: ParameterSet, error: KempfError) -> RerunVerdict:
 
 def _run_id(parameter_set_id: str, tolerance: float) -> str:
     """Return the id of the run that judges a set with the present code and packages."""
-    what = {"parameter_set_id": parameter_set_id, "tolerance": tolerance}
-    return runs.run_id(FLOW, {**what, "code": code_of_sets(), "packages": code_version.packages()})
+    inputs = {"parameter_set_id": parameter_set_id, "tolerance": tolerance}
+    return runs.run_id(FLOW, {**inputs, "code": code_of_sets(), "packages": code_version.packages()})
 
 
 def _as_run(verdict: RerunVerdict, tolerance: float) -> runs.FlowRun:

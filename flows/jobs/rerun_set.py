@@ -84,7 +84,7 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9, progress: Pr
         progress(done, len(chain), f"building {stored.parameter_set_id} again")
         verdicts.append(rerun_alone(warehouse, stored, tolerance))
     progress(len(chain), len(chain), "done")
-    return replace(verdicts[-1], rests_on={one.parameter_set_id: one.verdict for one in verdicts[:-1]})
+    return replace(verdicts[-1], rests_on={verdict.parameter_set_id: verdict.verdict for verdict in verdicts[:-1]})
 
 
 def rerun_alone(warehouse: Warehouse, stored: ParameterSet, tolerance: float = 1e-9) -> Rerun:
@@ -180,8 +180,8 @@ def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -
     # sets of earlier versions do not say on which machine they were made
     then = {**(stored.provenance.get("packages") or {}), **(stored.provenance.get("machine") or {})}
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
-    other = code_changed(inputs_of(stored), stored.provenance.get("made_by"))
-    return Rerun(stored.parameter_set_id, verdict, differences, other, changed)
+    new_code = code_changed(inputs_of(stored), stored.provenance.get("made_by"))
+    return Rerun(stored.parameter_set_id, verdict, differences, new_code, changed)
 
 
 def code_changed(inputs: Inputs, made_by: str | None = None) -> bool:

@@ -38,7 +38,7 @@ def search(
     instruments: Instruments,
     refused: Mapping[tuple[str, str | None], int],
     records: int,
-    said: Sequence[Correction] = (),
+    log_corrections: Sequence[Correction] = (),
 ) -> SearchedLog:
     """Find the manoeuvres in the channels of a log, and examine the channels.
 
@@ -53,10 +53,10 @@ def search(
         Values beyond their physical range, `kempf.pipeline.channels.doctor.refused.count`.
     records : int
         Of the log.
-    said : sequence of Correction, optional
+    log_corrections : sequence of Correction, optional
         What a person said of its manoeuvres.
     """
-    found, notes = find_segments(log, profile, instruments, said)
+    manoeuvres, notes = find_segments(log, profile, instruments, log_corrections)
     give_back(records)
     try:
         content = examine_instruments(instruments, profile, file_name, log_format, refused).content
@@ -66,20 +66,20 @@ def search(
         log.vessel,
         log.ingest_id,
         log.log_id,
-        corrections.basis(log.code_version, said),
+        corrections.basis(log.code_version, log_corrections),
         content["verdict"],
         tuple(finding["words"] for finding in content["findings"]),
         {**content, "notes": list(notes)},
     )
-    return SearchedLog(tuple(found), examination)
+    return SearchedLog(tuple(manoeuvres), examination)
 
 
-def search_again(warehouse: Warehouse, row: LogRow, said: Sequence[Correction]) -> SearchedLog:
+def search_again(warehouse: Warehouse, row: LogRow, log_corrections: Sequence[Correction]) -> SearchedLog:
     """Look through the stored readings of a log; nothing is stored.
 
     Parameters
     ----------
-    said : sequence of Correction
+    log_corrections : sequence of Correction
         What a person said of its manoeuvres.
 
     Raises
@@ -91,7 +91,9 @@ def search_again(warehouse: Warehouse, row: LogRow, said: Sequence[Correction]) 
     log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name, code_of(warehouse, "segment"))
     instruments = channels_of(warehouse, row.ingest_id)
     refused = count([readings.read_rejected(warehouse, row.ingest_id)])
-    return search(log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read, said)
+    return search(
+        log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read, log_corrections
+    )
 
 
 def store(warehouse: Warehouse, searched: Sequence[SearchedLog]) -> None:

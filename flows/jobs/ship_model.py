@@ -66,7 +66,7 @@ class ShipOfSet:
         return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
 
 
-def ship_of_set(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None = None) -> ShipOfSet:
+def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: float | None = None) -> ShipOfSet:
     """Return what a parameter set says of a ship, for steering.
 
     Parameters
@@ -81,61 +81,62 @@ def ship_of_set(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None
     DataRejected
         The set holds no six finite parameters.
     """
-    spec = ModelSpec.model_validate(dict(one.model_spec))
-    speed = speed_m_s if speed_m_s is not None else one.convergence.get("speed_m_s")
+    spec = ModelSpec.model_validate(dict(parameter_set.model_spec))
+    speed = speed_m_s if speed_m_s is not None else parameter_set.convergence.get("speed_m_s")
     if speed is None:
         raise UsageError(
             "speed_unknown",
-            f"{one.parameter_set_id} does not say at which speed it was identified.",
+            f"{parameter_set.parameter_set_id} does not say at which speed it was identified.",
             "Give the speed through the water with --speed.",
         )
-    by_name = {p.name: p.value for p in one.parameters if p.value is not None}
+    by_name = {p.name: p.value for p in parameter_set.parameters if p.value is not None}
     hull = Hull(*(float(by_name.get(name, np.nan)) for name in HULL_PARAMETERS))
     require_numbers(hull, float(speed))
-    profile = vessels.get(warehouse, str(one.provenance["inputs"]["profile_sha256"]))
+    profile = vessels.get(warehouse, str(parameter_set.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
-    effects = _effects(one, profile)
+    effects = _effects(parameter_set, profile)
     remarks = sentences(carried(hull, effects, float(speed), arm or 0.0))
-    noise, assumed = _noise(one, spec)
-    warnings = [*one.warnings, *assumed, *remarks]
-    if not one.convergence.get("converged"):
-        warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
-    covariance = covariance_of(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
+    noise, assumed = _noise(parameter_set, spec)
+    warnings = [*parameter_set.warnings, *assumed, *remarks]
+    if not parameter_set.convergence.get("converged"):
+        warnings.insert(0, f"the set did not converge: {parameter_set.convergence.get('reason')}")
+    covariance = covariance_of(parameter_set, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
     numbers = (float(speed), arm or 0.0, profile.length_m)
-    return ShipOfSet(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
+    return ShipOfSet(parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
 
 
-def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
+def _effects(parameter_set: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
     """Return the effects of a set as its fit had them."""
-    if not one.model_spec.get("effects"):
+    if not parameter_set.model_spec.get("effects"):
         return None
     # compiled code, which a set without effects does without
     from kempf.flows.jobs.standing_model import known_effects, model_of, named
     from kempf.flows.jobs.vessel_runs import LENGTH_M
     from kempf.pipeline.model.effect_model import EffectModel
 
-    spec, own = model_of(one)
+    spec, own = model_of(parameter_set)
     model = EffectModel(named(spec.effects, known_effects(own)))
-    values = {p.name: p.value for p in one.parameters}
+    values = {p.name: p.value for p in parameter_set.parameters}
     return ShipEffects(
         model,
         np.array([values[name] for name in model.names]),
         length_m=profile.length_m or LENGTH_M,
         draught_m=profile.draught_m or 1.0,
-        day=_last_load(one),
+        day=_last_load(parameter_set),
     )
 
 
-def _last_load(one: ParameterSet) -> float:
+def _last_load(parameter_set: ParameterSet) -> float:
     """Return how the ship was laden in the last log of a set, which she is taken to be still."""
-    inputs = one.provenance["inputs"]
+    inputs = parameter_set.provenance["inputs"]
     named = [("", Bounds(**bounds)) for bounds in inputs["segments"]]
     return list(loads_of_logs(named, inputs.get("draughts_m", {})).values())[-1]
 
 
-def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
+def _noise(parameter_set: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
     levels = _with_what_lasts(
-        one, {p.name: p.value for p in one.noise if "." not in p.name} or _levels_of_runs(one, spec)
+        parameter_set,
+        {p.name: p.value for p in parameter_set.noise if "." not in p.name} or _levels_of_runs(parameter_set, spec),
     )
     usual, values, assumed = usual_levels(spec), {}, []
     for field, name in _LEVELS.items():
@@ -149,9 +150,9 @@ def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
     return NoiseLevels(**values), assumed
 
 
-def _with_what_lasts(one: ParameterSet, levels: dict[str, Any]) -> dict[str, Any]:
+def _with_what_lasts(parameter_set: ParameterSet, levels: dict[str, Any]) -> dict[str, Any]:
     """Return noise levels with the variance of what lasts: an estimator that knows no other takes it for fresh."""
-    lasting = {p.name: p.value or 0.0 for p in one.noise}
+    lasting = {p.name: p.value or 0.0 for p in parameter_set.noise}
     pairs = (("sigma_v", "lateral_speed_noise.c"), ("sigma_r", "yaw_rate_noise.c"), ("sigma_psi", "heading_noise.c"))
     more = {
         name: float(np.hypot(levels[name] or 0.0, lasting[c])) for name, c in pairs if name in levels and c in lasting
@@ -159,21 +160,21 @@ def _with_what_lasts(one: ParameterSet, levels: dict[str, Any]) -> dict[str, Any
     return {**levels, **more}
 
 
-def _levels_of_runs(one: ParameterSet, spec: ModelSpec) -> dict[str, float]:
+def _levels_of_runs(parameter_set: ParameterSet, spec: ModelSpec) -> dict[str, float]:
     """Return the noise levels of a model with effects, geometric means over its manoeuvres.
 
     A measurement that no manoeuvre has keeps the level at which the fit began.
     """
-    runs = list(dict(one.convergence.get("levels") or {}).values())
+    runs = list(dict(parameter_set.convergence.get("levels") or {}).values())
     if not runs:
         return {}
     mean = np.exp(np.mean(np.array(runs, dtype=np.float64), axis=0))
     # intensities of force and current become levels in the long run
     force = float(mean[0] / np.sqrt(2.0 * spec.wind_correlation_rate_per_s))
     stream = float(mean[2] / np.sqrt(2.0 * spec.current_correlation_rate_per_s))
-    found = dict(zip(("sigma_v", "sigma_r", "sigma_psi"), mean[3:].tolist(), strict=True))
+    levels = dict(zip(("sigma_v", "sigma_r", "sigma_psi"), mean[3:].tolist(), strict=True))
     if spec.wind != "none":
-        found["sigma_F"] = force
+        levels["sigma_F"] = force
     if spec.current != "none":
-        found["sigma_V"] = stream
-    return found
+        levels["sigma_V"] = stream
+    return levels

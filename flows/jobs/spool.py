@@ -90,8 +90,8 @@ def _written(parts: Iterator[Readings], folder: Path) -> Spooled:
     tally, readings, rejected = Tally(), list[Path](), list[Path]()
     for part in parts:
         tally += part.tally
-        for paths, frame, what in ((readings, part.frame, "readings"), (rejected, part.rejected, "rejected")):
-            paths.append(folder / f"{what}-{len(paths):06d}.parquet")
+        for paths, frame, kind in ((readings, part.frame, "readings"), (rejected, part.rejected, "rejected")):
+            paths.append(folder / f"{kind}-{len(paths):06d}.parquet")
             try:
                 frame.write_parquet(paths[-1])
             except OSError as error:

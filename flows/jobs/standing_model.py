@@ -38,12 +38,12 @@ class Own:
 
     def effects(self) -> dict[str, Effect]:
         """Return the effects that the texts describe."""
-        made = {name: read(text, name) for name, text in self.files.items()}
+        by_name = {name: read(text, name) for name, text in self.files.items()}
         if self.formulas:
             from kempf.pipeline.model.terms.own import from_expression
 
-            made |= {name: from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
-        return made
+            by_name |= {name: from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
+        return by_name
 
     def as_json(self) -> dict[str, Any]:
         """Return the texts as JSON content."""
@@ -227,6 +227,6 @@ def _chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
 def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:
     """Return the rungs of the ladder that lead to a model, the plain one first, as JSON content."""
     return [
-        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
-        for step, one in enumerate(_chain(warehouse, model))
+        {**parameter_set.fit["rung"], "step": step, "parameter_set_id": parameter_set.parameter_set_id}
+        for step, parameter_set in enumerate(_chain(warehouse, model))
     ]

@@ -105,12 +105,12 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
             f"A leg of {request.leg_s:g} s leaves too little after the first {request.settle_s:g} s to settle.",
             "Ask for legs that are more than a minute longer.",
         )
-    one, _ = chosen_set(warehouse, vessel, request.set_id)
-    ship, dropped = _with_right_instruments(ship_of_set(warehouse, one, request.speed_m_s))
-    wanted = [(one.parameter_set_id, ship.hull, ship.effects)]
+    parameter_set, _ = chosen_set(warehouse, vessel, request.set_id)
+    ship, dropped = _with_right_instruments(ship_of_set(warehouse, parameter_set, request.speed_m_s))
+    makings = [(parameter_set.parameter_set_id, ship.hull, ship.effects)]
     if request.wrong is not None:
-        wanted.append(_wrong(warehouse, request.wrong, ship))
-    laws = tuple(_tried(*making, ship, request) for making in wanted)
+        makings.append(_wrong(warehouse, request.wrong, ship))
+    laws = tuple(_tried(*making, ship, request) for making in makings)
     warnings = [*ship.warnings, *dropped, *_not_simulated(ship, dropped)]
     needed = abs(laws[0].law.rudder_per_force * request.environment.wind_force.mean)
     if needed > 0.8 * request.settings.rudder_limit_rad:
@@ -123,7 +123,11 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
 
 def _on_instruments(effects: ShipEffects | None) -> list[str]:
     every = effects.model.effects if effects is not None else ()
-    return [one.name for one in every if one.terms and set(one.terms) <= {"lateral_speed", "yaw_rate", "heading"}]
+    return [
+        effect.name
+        for effect in every
+        if effect.terms and set(effect.terms) <= {"lateral_speed", "yaw_rate", "heading"}
+    ]
 
 
 def _with_right_instruments(ship: ShipOfSet) -> tuple[ShipOfSet, tuple[str, ...]]:
@@ -132,10 +136,10 @@ def _with_right_instruments(ship: ShipOfSet) -> tuple[ShipOfSet, tuple[str, ...]
     if ship.effects is None or not names:
         return ship, ()
     kept = np.concatenate([np.ones(6), [effect.name not in names for effect, _ in ship.effects.model.parameters]])
-    known = np.where(np.outer(kept, kept) > 0.0, ship.covariance, 0.0)
+    covariance = np.where(np.outer(kept, kept) > 0.0, ship.covariance, 0.0)
     verb = "is" if len(names) == 1 else "are"
-    said = f"{', '.join(names)} {verb} in neither law nor simulated ship: her instruments read right"
-    return replace(ship, effects=ship.effects.without(*names), covariance=known), (said,)
+    remark = f"{', '.join(names)} {verb} in neither law nor simulated ship: her instruments read right"
+    return replace(ship, effects=ship.effects.without(*names), covariance=covariance), (remark,)
 
 
 def _not_simulated(ship: ShipOfSet, dropped: tuple[str, ...]) -> tuple[str, ...]:
@@ -145,13 +149,13 @@ def _not_simulated(ship: ShipOfSet, dropped: tuple[str, ...]) -> tuple[str, ...]
     on_instruments = _on_instruments(ship.effects) if dropped else []
     by_name = {effect.name: effect for effect in ship.effects.model.effects}
 
-    def sails(one: Carried) -> bool:
-        effect = by_name[one.effect]
-        linear = one.how == "carried" and not one.sentence and not effect.states
-        return effect.rudder_course is not None or one.how == "shifts the course" or linear
+    def sails(entry: Carried) -> bool:
+        effect = by_name[entry.effect]
+        linear = entry.how == "carried" and not entry.sentence and not effect.states
+        return effect.rudder_course is not None or entry.how == "shifts the course" or linear
 
-    found = carried(ship.hull, ship.effects, ship.speed_m_s, ship.arm_per_m)
-    lacking = [one.effect for one in found if one.effect not in on_instruments and not sails(one)]
+    entries = carried(ship.hull, ship.effects, ship.speed_m_s, ship.arm_per_m)
+    lacking = [entry.effect for entry in entries if entry.effect not in on_instruments and not sails(entry)]
     return (f"the simulated ship sails without {', '.join(lacking)}",) if lacking else ()
 
 
@@ -213,7 +217,7 @@ def _simulated_gear(ship: ShipOfSet) -> SteeringGear | None:
     """Return what lies between the rudder's reading and the hull of a parameter set, None where nothing does."""
     if ship.effects is None:
         return None
-    sizes = [(one.rudder_course, float(ship.effects.of(one.name)[0])) for one in ship.effects.model.effects]
+    sizes = [(effect.rudder_course, float(ship.effects.of(effect.name)[0])) for effect in ship.effects.model.effects]
     parts = [_PARTS[course](size) for course, size in sizes if course is not None and size > 0.0]
     zero = -linear_motion(ship.hull, ship.effects, ship.speed_m_s, arm_per_m=ship.arm_per_m).rudder_rad
     return SteeringGear(parts, zero) if parts or zero != 0.0 else None

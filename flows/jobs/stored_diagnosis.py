@@ -59,7 +59,7 @@ def diagnosed_with_evidence(
 
     if stored is not None:
         say(f"{name} was stored without the curves that a report shows; diagnosing {chosen.vessel} again")
-    made = diagnose_again(warehouse, chosen, spec, own, progress)
+    diagnosis = diagnose_again(warehouse, chosen, spec, own, progress)
     evidence = diagnoses.evidence(warehouse, chosen.vessel, name)
     assert evidence is not None
-    return made, evidence
+    return diagnosis, evidence

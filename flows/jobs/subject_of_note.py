@@ -32,8 +32,8 @@ def subject_of(
         row = logs.by_prefix(warehouse, log)
         whose, subject, subject_id = row.vessel, "log", row.log_id
     elif segment is not None:
-        found = segments.by_prefix(warehouse, segment)
-        whose, subject, subject_id = found.vessel, "segment", found.segment_id
+        manoeuvre = segments.by_prefix(warehouse, segment)
+        whose, subject, subject_id = manoeuvre.vessel, "segment", manoeuvre.segment_id
     elif set_id is not None:
         stored = parameter_sets.get(warehouse, set_id)
         whose, subject, subject_id = stored.vessel, "set", stored.parameter_set_id

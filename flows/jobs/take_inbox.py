@@ -59,8 +59,8 @@ class InboxRun:
         """Return the run as JSON content."""
         return {
             "inbox": self.address,
-            "ingested": [one.show() for one in self.ingested],
-            "quarantined": [{**quarantine_json(one), "new": one.address in self.tried} for one in self.quarantined],
+            "ingested": [outcome.show() for outcome in self.ingested],
+            "quarantined": [{**quarantine_json(file), "new": file.address in self.tried} for file in self.quarantined],
             "waiting": list(self.waiting),
             "known": self.known,
         }
@@ -76,7 +76,7 @@ class NeedsAPerson(DataRejected):
     """
 
     def __init__(self, run: InboxRun) -> None:
-        names = [PurePosixPath(one.address).name for one in run.quarantined]
+        names = [PurePosixPath(file.address).name for file in run.quarantined]
         count = f"{len(names)} file{'s' if len(names) != 1 else ''}"
         super().__init__(
             "files_in_quarantine",
@@ -86,15 +86,15 @@ class NeedsAPerson(DataRejected):
         )
 
 
-def quarantine_json(one: InboxFile) -> dict[str, Any]:
+def quarantine_json(file: InboxFile) -> dict[str, Any]:
     """Return a file in quarantine as JSON content."""
     return {
-        "file": one.address,
-        "size_bytes": one.size_bytes,
-        "vessel": one.vessel,
-        "code": one.code,
-        "message": one.message,
-        "next_step": one.next_step,
+        "file": file.address,
+        "size_bytes": file.size_bytes,
+        "vessel": file.vessel,
+        "code": file.code,
+        "message": file.message,
+        "next_step": file.next_step,
     }
 
 
@@ -140,15 +140,15 @@ def take_inbox(
             waiting.append(file.path)
         else:
             due.append(_placed(register, file))
-    todo = [one for one in due if one.is_new(before.get(one.file.address))]
+    todo = [arrival for arrival in due if arrival.is_new(before.get(arrival.file.address))]
     _log.info(
         "inbox %s: %d files to look at, %d known, %d left for the next run",
         *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
     )
     rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
-    for done, one in enumerate(todo):
-        progress(done, len(todo), f"reading {one.file.name}")
-        row, outcome = take(warehouse, folder, one)
+    for done, arrival in enumerate(todo):
+        progress(done, len(todo), f"reading {arrival.file.name}")
+        row, outcome = take(warehouse, folder, arrival)
         rows.append(row)
         if outcome is not None:
             outcomes.append(outcome)
@@ -158,12 +158,12 @@ def take_inbox(
     inbox.record(warehouse, rows)
     _register(warehouse, folders.profiles)
     progress(len(todo), len(todo), "done")
-    held = [one for one in inbox.below(warehouse, folder.address).values() if one.outcome == "quarantined"]
-    tried = {one.file.address for one in todo} | {file.address for file, _ in folders.unreadable.values()}
+    held = [row for row in inbox.below(warehouse, folder.address).values() if row.outcome == "quarantined"]
+    tried = {arrival.file.address for arrival in todo} | {file.address for file, _ in folders.unreadable.values()}
     return InboxRun(
         folder.address,
         tuple(outcomes),
-        tuple(sorted(held, key=lambda one: one.address)),
+        tuple(sorted(held, key=lambda row: row.address)),
         frozenset(tried),
         tuple(waiting),
         len(due) - len(todo),
@@ -173,8 +173,8 @@ def take_inbox(
 def _gone(files: Sequence[SourceFile], before: Mapping[str, InboxFile]) -> list[InboxFile]:
     """Return the rows that end the quarantine of files that were moved, renamed or deleted."""
     there = {file.address for file in files}
-    left = [one for one in before.values() if one.outcome == "quarantined" and one.address not in there]
-    return [replace(one, outcome="dismissed", message="It is no longer in the inbox.", next_step=None) for one in left]
+    left = [row for row in before.values() if row.outcome == "quarantined" and row.address not in there]
+    return [replace(row, outcome="dismissed", message="It is no longer in the inbox.", next_step=None) for row in left]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +189,7 @@ class _Folders:
     def rows(self, before: Mapping[str, InboxFile]) -> list[InboxFile]:
         """Return what is to be stored of them: those that cannot be read, and those that could not before."""
         broken = [_quarantined(file, None, error, None) for file, error in self.unreadable.values()]
-        bad = {one.address for one in broken}
+        bad = {row.address for row in broken}
         mended = [
             InboxFile(file.address, file.size_bytes, file.modified_utc_ns, "ingested")
             for file in self.files.values()
@@ -206,8 +206,8 @@ def _read_folders(folder: SourceFolder, files: Sequence[SourceFile]) -> _Folders
     for file in there:
         try:
             with folder.opened(file) as stream:
-                found = profile_of(whole(LogFile(stream), file.address, "vessel profile"), file.address)
-            read[file.folder] = merge([*_beside(read, file), (file.address, found)])
+                profile = profile_of(whole(LogFile(stream), file.address, "vessel profile"), file.address)
+            read[file.folder] = merge([*_beside(read, file), (file.address, profile)])
         except KempfError as error:
             if error.code in _NO_FILES:
                 raise
@@ -261,7 +261,7 @@ def _placed(register: Register, file: SourceFile) -> Placed:
     return Placed(file, place.vessel, laid_over(stored, place.given, place.vessel))
 
 
-def take(warehouse: Warehouse, folder: SourceFolder, one: Placed) -> tuple[InboxFile, IngestOutcome | None]:
+def take(warehouse: Warehouse, folder: SourceFolder, arrival: Placed) -> tuple[InboxFile, IngestOutcome | None]:
     """Ingest one file; where it cannot be placed or read, return the row that puts it into quarantine.
 
     Raises
@@ -269,22 +269,22 @@ def take(warehouse: Warehouse, folder: SourceFolder, one: Placed) -> tuple[Inbox
     KempfError
         ``disk_full``, ``warehouse_not_writable``, ...: no file's fault.
     """
-    file = one.file
+    file = arrival.file
     try:
-        if one.error is not None or one.vessel is None or one.profile is None:
-            assert one.error is not None
-            raise one.error
+        if arrival.error is not None or arrival.vessel is None or arrival.profile is None:
+            assert arrival.error is not None
+            raise arrival.error
         with folder.opened(file) as stream:
-            outcome = ingest_log(warehouse, one.vessel, file.name, LogFile(stream), one.profile, file.address)
+            outcome = ingest_log(warehouse, arrival.vessel, file.name, LogFile(stream), arrival.profile, file.address)
     except Exception as error:  # whatever it is, the next log must not pay for it
-        found = wrapped(error)
-        if found.code in _NO_FILES:
-            raise found from error
-        _log.info("%s: into quarantine: [%s] %s", file.path, found.code, found.message)
-        return _quarantined(file, one.vessel, found, one.basis), None
+        failure = wrapped(error)
+        if failure.code in _NO_FILES:
+            raise failure from error
+        _log.info("%s: into quarantine: [%s] %s", file.path, failure.code, failure.message)
+        return _quarantined(file, arrival.vessel, failure, arrival.basis), None
     row = InboxFile(
-        *(file.address, file.size_bytes, file.modified_utc_ns, "ingested", one.vessel, outcome.log_id),
-        basis=one.basis,
+        *(file.address, file.size_bytes, file.modified_utc_ns, "ingested", arrival.vessel, outcome.log_id),
+        basis=arrival.basis,
     )
     return row, outcome
 
@@ -302,7 +302,7 @@ def _quarantined(file: SourceFile, vessel: str | None, error: KempfError, basis:
 def _register(warehouse: Warehouse, of_folder: Mapping[str, VesselProfile]) -> None:
     """Make what the folders' profiles say of known vessels current, also where no log of theirs is new."""
     stored = vessels.profiles(warehouse)
-    named = [(given.vessel or folder, given) for folder, given in of_folder.items()]
+    named = [(profile.vessel or folder, profile) for folder, profile in of_folder.items()]
     vessels.register_all(
-        warehouse, [(name, laid_over(stored[name], given, name)) for name, given in named if name in stored]
+        warehouse, [(name, laid_over(stored[name], profile, name)) for name, profile in named if name in stored]
     )

@@ -63,5 +63,5 @@ def tried(
     settings = DiagnosisSettings(level=1.0, refits=1, certain_std=0.0, most_steps=1)
     examined = examine(warehouse, chosen, spec, own.beside(mine), settings, progress, only=(name,))
     document = as_json(examined.diagnosis)
-    found = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
-    return dict(found)
+    content = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
+    return dict(content)

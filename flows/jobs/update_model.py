@@ -68,9 +68,9 @@ def store_up_to_date(
 
     Parameters and results are those of `flows.jobs.vessel_model.store_model`.
     """
-    found = stored_model(warehouse, chosen, spec, own, search)
-    if found is not None:
-        return found, False
+    stored = stored_model(warehouse, chosen, spec, own, search)
+    if stored is not None:
+        return stored, False
     brought = bring_forward(warehouse, chosen, spec, own, progress, flow_run, search)
     if brought is None:
         return store_model(warehouse, chosen, spec, own, progress, flow_run, search=search, keep=keep)
@@ -111,33 +111,33 @@ def bring_forward(
     parent: str | None = None
     before: ParameterSet | None = None
     for k in range(len(spec.effects) + 1):
-        one = spec.model_copy(update={"effects": spec.effects[:k]})
-        wanted = inputs_of(chosen, one, own, search)
-        before = _stored_before(warehouse, chosen, one, wanted)
+        model = spec.model_copy(update={"effects": spec.effects[:k]})
+        full_inputs = inputs_of(chosen, model, own, search)
+        before = _stored_before(warehouse, chosen, model, full_inputs)
         if before is None:
             return None
         if len(before.segment_ids) < len(chosen.segments):
             fewer = _further(chosen, before)
-            inputs = _updating(inputs_of(fewer, one, own, search), before)
-            made = _brought(warehouse, fewer, inputs, before, parent, progress, flow_run)
-            if made is None:
+            inputs = _updating(inputs_of(fewer, model, own, search), before)
+            addition = _brought(warehouse, fewer, inputs, before, parent, progress, flow_run)
+            if addition is None:
                 return None
-            new.append(made)
-            before = brought_forward(before, made)
+            new.append(addition)
+            before = brought_forward(before, addition)
         parent = before.parameter_set_id
     assert before is not None
     return BroughtForward(tuple(new), before)
 
 
-def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted: Inputs) -> ParameterSet | None:
+def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, inputs: Inputs) -> ParameterSet | None:
     """Return the stored set of a model that rests on most of the chosen manoeuvres and on no other, whole."""
     names = {segment.segment_id for segment in chosen.segments}
     if len(names) <= FEWEST:
         return None
-    rows = parameter_sets.pooled(warehouse, chosen.vessel, spec.sha256, wanted.estimator)
-    mine = {key: value for key, value in wanted.settings.items() if key != "segments"}
+    rows = parameter_sets.pooled(warehouse, chosen.vessel, spec.sha256, inputs.estimator)
+    mine = {key: value for key, value in inputs.settings.items() if key != "segments"}
     by_id = {row.parameter_set_id: row for row in rows}
-    for row in sorted(rows, key=lambda one: (-one.manoeuvres, -one.fitted_at_once, one.parameter_set_id)):
+    for row in sorted(rows, key=lambda row: (-row.manoeuvres, -row.fitted_at_once, row.parameter_set_id)):
         settings = {key: value for key, value in row.settings.items() if key not in ("segments", UPDATES)}
         at_once = row.fitted_at_once
         if (
@@ -149,22 +149,22 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
             and (rests_on := _segments(row, by_id)) is not None
             and rests_on <= names
         ):
-            found = parameter_sets.get(warehouse, row.parameter_set_id, chosen.vessel)
-            left = found.convergence.get(POSTERIOR)
-            usable_set = found.convergence.get("converged") and left and from_json(left).usable
-            return found if usable_set or row.manoeuvres == len(names) else None
+            stored = parameter_sets.get(warehouse, row.parameter_set_id, chosen.vessel)
+            left = stored.convergence.get(POSTERIOR)
+            usable_set = stored.convergence.get("converged") and left and from_json(left).usable
+            return stored if usable_set or row.manoeuvres == len(names) else None
     return None
 
 
 def _segments(row: parameter_sets.Pooled, by_id: Mapping[str, parameter_sets.Pooled]) -> set[str] | None:
     """Return the segments that a set rests on; None where one that it brings forward is lost."""
-    found = set(row.segment_ids)
+    segment_ids = set(row.segment_ids)
     while row.updates is not None:
         if row.updates.set not in by_id:
             return None
         row = by_id[row.updates.set]
-        found.update(row.segment_ids)
-    return found
+        segment_ids.update(row.segment_ids)
+    return segment_ids
 
 
 def _further(chosen: Chosen, before: ParameterSet) -> Chosen:
@@ -225,15 +225,15 @@ def build_updated(instruments: Mapping[str, Instruments], request: SetRequest) -
     assert before is not None
     bounds = list(zip(request.segment_ids, request.inputs.bounds, strict=True))
     runs = assemble(instruments, request.profile, bounds, request.spec, _like(before))
-    made = _updated_set(runs, request, before)
-    if made is None:
+    addition = _updated_set(runs, request, before)
+    if addition is None:
         raise DataRejected(
             "not_brought_forward",
             f"With this code {before.parameter_set_id} cannot be brought forward by {len(bounds)} manoeuvres: its "
             "model is to be fitted to all of them at once.",
             f"Make it so with `{command_for([request.vessel])}`.",
         )
-    return made
+    return addition
 
 
 def _like(before: ParameterSet) -> Like:
@@ -255,59 +255,59 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
     model = _model(before, Own.from_json(settings.get("own") or {}))
     search = settings_of(settings.get(SEARCH) or {})
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        found = updated(
+        update = updated(
             left, model, runs.runs, runs.spec, workers, search, stated=lambda fit: with_instants(fit, workers).fit
         )
-    if found is None:
+    if update is None:
         return None
-    errors = errors_of(found.fit, found.known)
-    gross_errors = sum(sum(one.gross_errors.values()) for one in found.alone)
-    made = as_set(errors.fit, errors.widened(found.agreement), runs, gross_errors, request)
+    errors = errors_of(update.fit, update.known)
+    gross_errors = sum(sum(single.gross_errors.values()) for single in update.alone)
+    result = as_set(errors.fit, errors.widened(update.agreement), runs, gross_errors, request)
     then = before.convergence
-    behind = posterior_of(errors.fit, errors.together, found.agreement, found.log_likelihood, errors.late)
-    skipped = {name: why for name, why in {**runs.skipped, **found.left_out}.items() if name in request.segment_ids}
+    behind = posterior_of(errors.fit, errors.together, update.agreement, update.log_likelihood, errors.late)
+    skipped = {name: why for name, why in {**runs.skipped, **update.left_out}.items() if name in request.segment_ids}
     number = len(then["levels"])
     return replace(
-        made,
-        start_utc_ns=min(before.start_utc_ns, made.start_utc_ns),
-        fit={"horizon": "free run", "rung": _rung(found, errors.fit, before, number)},
+        result,
+        start_utc_ns=min(before.start_utc_ns, result.start_utc_ns),
+        fit={"horizon": "free run", "rung": _rung(update, errors.fit, before, number)},
         convergence={
-            **made.convergence,
-            "log_likelihood": found.log_likelihood,
-            "measurements": then["measurements"] + found.fit.count,
-            "speed_m_s": _mean(then["speed_m_s"], number, made.convergence["speed_m_s"], len(found.fit.runs)),
+            **result.convergence,
+            "log_likelihood": update.log_likelihood,
+            "measurements": then["measurements"] + update.fit.count,
+            "speed_m_s": _mean(then["speed_m_s"], number, result.convergence["speed_m_s"], len(update.fit.runs)),
             "gross_errors": then["gross_errors"] + gross_errors,
             "held_out": [],
             "left_out": skipped,
             POSTERIOR: {**behind.show(), "slip_m": then[POSTERIOR]["slip_m"]},
             **(
-                {"widened": found.agreement.widened}
+                {"widened": update.agreement.widened}
                 if errors.of_effects
-                else {"pooling": pooling(found.agreement, found.alone, found.fit, then["pooling"]["segments"])}
+                else {"pooling": pooling(update.agreement, update.alone, update.fit, then["pooling"]["segments"])}
             ),
         },
-        warnings=(*(f"left out: {name} ({why})" for name, why in sorted(skipped.items())), *made.warnings),
+        warnings=(*(f"left out: {name} ({why})" for name, why in sorted(skipped.items())), *result.warnings),
         parent=request.parent,
     )
 
 
-def _rung(found: Updated, fit: PooledFit, before: ParameterSet, number: int) -> dict[str, Any]:
+def _rung(update: Updated, fit: PooledFit, before: ParameterSet, number: int) -> dict[str, Any]:
     """Return the rung of the ladder: of the new runs, means over all, and what was foreseen of the new ones."""
     first, count = before.fit["rung"], len(fit.runs)
-    made = rung(0, step_of(fit, (), None), agreement=found.agreement)
+    new_rung = rung(0, step_of(fit, (), None), agreement=update.agreement)
     left = from_json(before.convergence[POSTERIOR])
-    foreseen = [free_run_of(one, left.point[:6], left.point[6:]) for one in fit.runs]
+    foreseen = [free_run_of(filtered, left.point[:6], left.point[6:]) for filtered in fit.runs]
     intensity = {
         name: float(np.exp(_mean(np.log(first["disturbance_intensity"][name]), number, np.log(value), count)))
-        for name, value in made["disturbance_intensity"].items()
+        for name, value in new_rung["disturbance_intensity"].items()
     }
     return {
-        **made,
-        "in_sample_error": _mean(first["in_sample_error"], number, made["in_sample_error"], count),
+        **new_rung,
+        "in_sample_error": _mean(first["in_sample_error"], number, new_rung["in_sample_error"], count),
         "held_out_error": first["held_out_error"],
-        "foreseen": {one.name: one.relative_error for one in foreseen},
+        "foreseen": {free_run.name: free_run.relative_error for free_run in foreseen},
         "disturbance_intensity": intensity,
-        "log_likelihood": found.log_likelihood,
+        "log_likelihood": update.log_likelihood,
         "converged": True,
     }
 

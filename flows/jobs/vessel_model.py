@@ -113,12 +113,12 @@ def store_model(
     (ParameterSet, bool)
         The model, and whether it is new.
     """
-    found = stored_model(warehouse, chosen, spec, own, search)
-    if found is not None:
-        return found, False
+    parameter_set = stored_model(warehouse, chosen, spec, own, search)
+    if parameter_set is not None:
+        return parameter_set, False
     way = [spec.model_copy(update={"effects": spec.effects[:k]}) for k in range(len(spec.effects) + 1)]
-    wanted = [inputs_of(chosen, one, own, search) for one in way]
-    names = [parameter_set_id(inputs) for inputs in wanted]
+    all_inputs = [inputs_of(chosen, model, own, search) for model in way]
+    names = [parameter_set_id(inputs) for inputs in all_inputs]
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
     if fitted is None:
         runs = assembled(warehouse, chosen, spec, progress)
@@ -127,20 +127,20 @@ def store_model(
         fitted = _fitted_model(runs, spec, own, search, reported_to(progress, pieces))
         progress(len(way), pieces, "predicting one leg ahead")
     profile = vessels.get(warehouse, chosen.profile_sha256)
-    made = []
-    for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
+    new_sets = []
+    for inputs, name, parent, fit in zip(all_inputs, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
             origin = provenance.collect(
                 warehouse, inputs, list(chosen.ingests.values()), flow_run, vessel=chosen.vessel
             )
             ids = tuple(segment.segment_id for segment in chosen.segments)
-            made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
-            progress(len(way) + 1, len(way) + 1, errors_in_words(made[-1].fit["rung"]))
+            new_sets.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
+            progress(len(way) + 1, len(way) + 1, errors_in_words(new_sets[-1].fit["rung"]))
     if keep is None:
-        parameter_sets.insert(warehouse, made)
+        parameter_sets.insert(warehouse, new_sets)
     else:
-        keep(made)
-    return made[-1], True
+        keep(new_sets)
+    return new_sets[-1], True
 
 
 def errors_in_words(rung: Mapping[str, Any]) -> str:
@@ -199,23 +199,23 @@ def build_with_errors_that_last(instruments: Mapping[str, Instruments], request:
     """
     fitted = _fitted_request(instruments, request)
     fit = fitted.fits[-1]
-    late = not all(one.run.instant_errors.known for one in fit.runs)
+    late = not all(filtered.run.instant_errors.known for filtered in fit.runs)
     return _single(fitted, request) if (fit.noise or late) and fit.converged else None
 
 
 def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:
     fit, (record,) = fitted.fits[-1], fitted.runs.records
     errors = errors_of(fit, uncertainty_of(fit))
-    known = errors.widened(agreement_of(fit)) if fit.ship.model.effects else errors.together
-    made = as_set(errors.fit, known, fitted.runs, fitted.plain.gross_errors, request)
+    uncertainty = errors.widened(agreement_of(fit)) if fit.ship.model.effects else errors.together
+    result = as_set(errors.fit, uncertainty, fitted.runs, fitted.plain.gross_errors, request)
     return replace(
-        made,
+        result,
         noise=(
             *(Stored(name, level, None, NOISE_PARAMETERS[name]) for name, level in fit.sigmas(0).items()),
-            *made.noise,
+            *result.noise,
         ),
-        fit=known.one_step[0],
-        warnings=(*record.warnings, *made.warnings),
+        fit=uncertainty.one_step[0],
+        warnings=(*record.warnings, *result.warnings),
         parent=request.spec.parent,
     )
 
@@ -238,24 +238,24 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             "no_parent", f"The model {' + '.join(effects)} has no parent.", "Make it with `kempf effects add`."
         )
     _, left = split(runs.runs)
-    number = next(k for k, one in enumerate(fitted.fits) if one is fit)
+    number = next(k for k, candidate in enumerate(fitted.fits) if candidate is fit)
     before = fitted.ahead[number - 1] if number else None
     plain, errors = fitted.plain, errors_of(fit, uncertainty_of(fit))
     step = step_of(errors.fit, [runs.runs[i] for i in left], fitted.ahead[number])
     agreement = agreement_of(fit) if effects else plain.agreement
-    made = as_set(errors.fit, errors.widened(agreement), runs, plain.gross_errors, request)
+    result = as_set(errors.fit, errors.widened(agreement), runs, plain.gross_errors, request)
     left_behind = posterior_of(errors.fit, errors.together, agreement, fit.log_likelihood, errors.late)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
     return replace(
-        made,
+        result,
         fit={"horizon": "free run", "rung": rung(0, step, before)},
         convergence={
-            **made.convergence,
+            **result.convergence,
             "held_out": [run.name for run in step.held],
             "left_out": skipped,
-            POSTERIOR: {**left_behind.show(), "slip_m": common_slip([one.run for one in fit.runs])},
+            POSTERIOR: {**left_behind.show(), "slip_m": common_slip([filtered.run for filtered in fit.runs])},
             **(
                 {} if effects or len(plain.alone) < 2 else {"pooling": pooling(plain.agreement, plain.alone, plain.fit)}
             ),
@@ -265,7 +265,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             *alone,
             *(() if effects else _disagreement(plain)),
             *_ahead_disagrees(step.ahead),
-            *made.warnings,
+            *result.warnings,
         ),
         parent=request.parent,
     )
@@ -290,11 +290,11 @@ def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before
         "widened": agreement.widened,
         "members": [
             {
-                "segment": one.run.name,
-                "gross_errors": one.gross_errors,
-                "off_in_std": dict(zip(HULL_PARAMETERS, off_in_std(one, fit).tolist(), strict=True)),
+                "segment": single.run.name,
+                "gross_errors": single.gross_errors,
+                "off_in_std": dict(zip(HULL_PARAMETERS, off_in_std(single, fit).tolist(), strict=True)),
             }
-            for one in alone
+            for single in alone
         ],
     }
 
@@ -320,20 +320,20 @@ def _disagreement(plain: PlainFit) -> tuple[str, ...]:
 
 
 def as_set(
-    fit: PooledFit, known: PooledUncertainty, runs: VesselRuns, gross_errors: int, request: SetRequest
+    fit: PooledFit, uncertainty: PooledUncertainty, runs: VesselRuns, gross_errors: int, request: SetRequest
 ) -> ParameterSet:
     """Return what every set of a common fit holds.
 
     Parameters
     ----------
-    known : PooledUncertainty
+    uncertainty : PooledUncertainty
         The errors that are stated.
     gross_errors : int
         Measurements that were taken out.
     """
-    spec, ship = request.spec, fit.ship_part(known.covariance)
+    spec, ship = request.spec, fit.ship_part(uncertainty.covariance)
     covariance = ship.covariance
-    speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
+    speed = float(np.mean([np.mean(filtered.run.speed_m_s) for filtered in fit.runs]))
     return ParameterSet(
         **described(request),
         model_name=" + ".join((spec.name, *spec.effects)),
@@ -353,17 +353,19 @@ def as_set(
             "speed_m_s": speed,
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
-            "standard_errors": known.kind,
+            "standard_errors": uncertainty.kind,
             **({"widened": agreement_of(fit).widened} if ship.model.effects else {}),
             "gross_errors": gross_errors,
             "gross_error_instants_s": _gross_errors(fit, runs),
-            "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
+            "levels": {filtered.run.name: list(levels) for filtered, levels in zip(fit.runs, fit.levels, strict=True)},
         },
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
             *_at_bounds(ship),
             *dict.fromkeys(
-                sentence for one in known.one_step for sentence in plausibility_warnings(fit.hull, ship.std[:6], one)
+                sentence
+                for step in uncertainty.one_step
+                for sentence in plausibility_warnings(fit.hull, ship.std[:6], step)
             ),
             *without_arm(spec, arm_of(spec, request.profile)),
             *channel_warnings(request.origin),
@@ -385,7 +387,7 @@ def _at_bounds(ship: ShipPart) -> tuple[str, ...]:
 def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:
     """Return which measurements the fit left out, by run and measurement, so that a comparison leaves them out too."""
     whole = {run.name: run for run in runs.runs}
-    left_out = {one.run.name: instants_left_out(whole[one.run.name], one.run) for one in fit.runs}
+    left_out = {filtered.run.name: instants_left_out(whole[filtered.run.name], filtered.run) for filtered in fit.runs}
     return {name: instants for name, instants in left_out.items() if instants}
 
 

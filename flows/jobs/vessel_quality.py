@@ -45,24 +45,26 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
     NotFound
         ``no_warehouse``, ``no_vessel``.
     """
-    found = segments.found_in(warehouse, vessel)
+    manoeuvres = segments.found_in(warehouse, vessel)
     standing = {name: place for place, name in enumerate(history.standing(warehouse, vessel))}
     sets = parameter_sets.convergences(warehouse, vessel, names=list(standing))
-    sets.sort(key=lambda one: standing[one.parameter_set_id])
-    return [*_of_logs(warehouse, vessel, found), *_of_sets(sets)]
+    sets.sort(key=lambda row: standing[row.parameter_set_id])
+    return [*_of_logs(warehouse, vessel, manoeuvres), *_of_sets(sets)]
 
 
-def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment]) -> Iterable[Finding]:
-    fitted = {one.ingest_id for one in found if one.is_fitted}
+def _of_logs(warehouse: Warehouse, vessel: str, manoeuvres: Iterable[segments.Segment]) -> Iterable[Finding]:
+    fitted = {manoeuvre.ingest_id for manoeuvre in manoeuvres if manoeuvre.is_fitted}
     rows = logs.current(warehouse, vessel)
-    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
+    by_ingest = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
     for row in rows:
-        seen = said.get(row.ingest_id)
-        if seen is not None:
-            yield from (Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in seen.findings[:1])
+        examination = by_ingest.get(row.ingest_id)
+        if examination is not None:
+            yield from (
+                Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in examination.findings[:1]
+            )
         if row.ingest_id in fitted:
             continue
-        missing = [note for note in (seen.notes if seen else ()) if "cannot be looked for" in note]
+        missing = [note for note in (examination.notes if examination else ()) if "cannot be looked for" in note]
         if missing:
             yield Finding("missing_channels", row.log_id, f"{row.file_name}: {missing[0]}.")
         else:
@@ -72,16 +74,18 @@ def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment
 
 
 def _of_sets(sets: Iterable[parameter_sets.Convergence]) -> Iterable[Finding]:
-    for one in sets:
-        what = f"{one.parameter_set_id} ({one.model_name}, {one.estimator})"
-        if not one.converged:
-            yield Finding("not_converged", one.parameter_set_id, f"{what} did not converge.", one.segment_ids)
-        if one.pooling.get("may_be_pooled") is False:
-            said = one.pooling
-            words = f"{what}: its {said['segments']} manoeuvres do not share one hull (p = {said['p_value']:.1g})."
-            yield Finding("no_shared_hull", one.parameter_set_id, words, one.segment_ids)
-        for name, why in sorted(one.left_out.items()):
-            yield Finding("left_out", name, f"{what} leaves {name} out: {why}.", (name,))
+    for row in sets:
+        title = f"{row.parameter_set_id} ({row.model_name}, {row.estimator})"
+        if not row.converged:
+            yield Finding("not_converged", row.parameter_set_id, f"{title} did not converge.", row.segment_ids)
+        if row.pooling.get("may_be_pooled") is False:
+            pooling = row.pooling
+            words = (
+                f"{title}: its {pooling['segments']} manoeuvres do not share one hull (p = {pooling['p_value']:.1g})."
+            )
+            yield Finding("no_shared_hull", row.parameter_set_id, words, row.segment_ids)
+        for name, why in sorted(row.left_out.items()):
+            yield Finding("left_out", name, f"{title} leaves {name} out: {why}.", (name,))
 
 
 def marks(warehouse: Warehouse, vessel: str | None = None) -> dict[str, list[str]]:
@@ -94,11 +98,11 @@ def marks(warehouse: Warehouse, vessel: str | None = None) -> dict[str, list[str
     """
     marked: dict[str, list[str]] = {}
     for row in parameter_sets.convergences(warehouse, vessel, code_of(warehouse, "estimate")):
-        said = dict.fromkeys(row.left_out, "left out of the pooled set")
+        remarks = dict.fromkeys(row.left_out, "left out of the pooled set")
         # of a pooled set that did not converge no single zigzag is at fault
         if not row.converged and len(row.segment_ids) == 1:
-            said |= {row.segment_ids[0]: f"not converged ({row.estimator})"}
-        for name, words in said.items():
+            remarks |= {row.segment_ids[0]: f"not converged ({row.estimator})"}
+        for name, words in remarks.items():
             if words not in marked.setdefault(name, []):
                 marked[name].append(words)
     return marked

@@ -82,20 +82,20 @@ def run_id_of(vessel: str, *, changed_only: bool, estimator: str | None = None) 
     return runs.run_id(FLOW, {"vessel": vessel, "changed_only": changed_only, "estimator": estimator})
 
 
-def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, FlowRun]]) -> None:
+def remember_all(warehouse: Warehouse, pairs: Sequence[tuple[VesselReport, FlowRun]]) -> None:
     """Store runs in one commit; failures that stood there before are marked as known in the reports and in the runs.
 
     Parameters
     ----------
-    found : sequence of (VesselReport, FlowRun)
+    pairs : sequence of (VesselReport, FlowRun)
         Each with the run of its `VesselReport.as_run`.
     """
     every = [
-        run_id_of(report.vessel, changed_only=changed_only) for report, _ in found for changed_only in (True, False)
+        run_id_of(report.vessel, changed_only=changed_only) for report, _ in pairs for changed_only in (True, False)
     ]
-    stored = {run.run_id: run for run in runs.some(warehouse, [*every, *(run.run_id for _, run in found)])}
+    stored = {run.run_id: run for run in runs.some(warehouse, [*every, *(run.run_id for _, run in pairs)])}
     entries = []
-    for report, run in found:
+    for report, run in pairs:
         before = {_what(f) for f in stored[run.run_id].message["failures"]} if run.run_id in stored else set()
         for failure in report.failures:
             failure["known"] = _what(failure) in before
@@ -133,9 +133,9 @@ def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:
     names = [run_id_of(str(run.vessel), changed_only=changed_only) for changed_only in (True, False)]
     stale = [stored[name] for name in names if name in stored and name != run.run_id]
     return [
-        replace(one, message={k: v for k, v in one.message.items() if k != "state"})
-        for one in stale
-        if "state" in one.message
+        replace(stale_run, message={k: v for k, v in stale_run.message.items() if k != "state"})
+        for stale_run in stale
+        if "state" in stale_run.message
     ]
 
 

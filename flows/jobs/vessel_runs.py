@@ -62,8 +62,8 @@ def assembled(
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
-    made = assemble(instruments, profile, bounds, spec, like, chosen.loads)
-    return VesselRuns(made.spec, made.runs, made.records, chosen.skipped | made.skipped)
+    runs = assemble(instruments, profile, bounds, spec, like, chosen.loads)
+    return VesselRuns(runs.spec, runs.runs, runs.records, chosen.skipped | runs.skipped)
 
 
 def assemble(
@@ -93,9 +93,11 @@ def assemble(
         ``no_runs``.
     """
     records, skipped = [], {}
-    for name, one in in_order(bounds):
+    for name, stretch in in_order(bounds):
         try:
-            records.append((name, one, make_record(instruments[one.log_id], one.start_utc_ns, one.end_utc_ns)))
+            records.append(
+                (name, stretch, make_record(instruments[stretch.log_id], stretch.start_utc_ns, stretch.end_utc_ns))
+            )
         except KempfError as error:
             skipped[name] = str(error)
     if not records:
@@ -115,8 +117,10 @@ def assemble(
     days = {log_id: day for day, log_id in enumerate(order)}
     runs = with_common_slip(
         [
-            make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id], load[one.log_id])
-            for name, one, record in records
+            make_run(
+                name, record, instruments[stretch.log_id], ready, ship, step, days[stretch.log_id], load[stretch.log_id]
+            )
+            for name, stretch, record in records
         ],
         like.slip_m if like else None,
     )

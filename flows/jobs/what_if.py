@@ -75,7 +75,7 @@ class WhatIf:
             "value": self.value,
             "std": self.std,
             "others": "held as they are: fitted anew beside it, a value costs less",
-            "tried": [one.show() for one in self.tried],
+            "tried": [attempt.show() for attempt in self.tried],
         }
 
     def measured(self) -> dict[str, Float]:
@@ -88,11 +88,11 @@ class WhatIf:
         }
         return {"time_s": run.time_s, "rudder_angle_rad": run.rudder_rad, **shown}
 
-    def predicted(self, one: Tried) -> dict[str, Float]:
+    def predicted(self, attempt: Tried) -> dict[str, Float]:
         """Return what one value predicts of it, each of shape (n,), as `measured` does."""
         zero = first_heading(self.run.filtered.run)
         return {
-            f"{name}_{_UNITS[name]}": one.predicted[:, i] + (zero if name == "heading" else 0.0)
+            f"{name}_{_UNITS[name]}": attempt.predicted[:, i] + (zero if name == "heading" else 0.0)
             for i, name in enumerate(CHANNELS)
         }
 
@@ -125,18 +125,18 @@ def what_if(
         ``prediction_diverges``: the estimate itself runs away.
     """
     hers = bound(warehouse, vessel, set_id, progress)
-    known = {p.name: p for p in hers.parameter_set.parameters if p.name in hers.names}
-    if parameter not in known:
+    parameters = {p.name: p for p in hers.parameter_set.parameters if p.name in hers.names}
+    if parameter not in parameters:
         raise NotFound(
             "no_parameter",
             f"{hers.parameter_set.parameter_set_id} has no parameter {parameter[:60]!r}.",
-            f"Choose one of {', '.join(known)}.",
-            {"parameters": list(known)},
+            f"Choose one of {', '.join(parameters)}.",
+            {"parameters": list(parameters)},
         )
     run = _run(hers, segment_id)
-    one, place = known[parameter], hers.names.index(parameter)
-    std = one.std if one.std is not None and np.isfinite(one.std) and one.std > 0.0 else None
-    step = _STEP * std if std is not None else _SHARE * abs(one.value) or 1e-6
+    estimate, place = parameters[parameter], hers.names.index(parameter)
+    std = estimate.std if estimate.std is not None and np.isfinite(estimate.std) and estimate.std > 0.0 else None
+    step = _STEP * std if std is not None else _SHARE * abs(estimate.value) or 1e-6
     moves = np.arange(-_SIDE, _SIDE + 1)
     here = _log_likelihood(hers, place, 0.0)
     if not np.isfinite(here):
@@ -147,13 +147,13 @@ def what_if(
         )
     tried = []
     for done, move in enumerate(moves.tolist()):
-        progress(done, moves.size, f"{parameter} at {one.value + move * step:.4g}")
+        progress(done, moves.size, f"{parameter} at {estimate.value + move * step:.4g}")
         moved = _moved(hers, place, move * step)
         free = free_run_of(run.filtered, *moved)
         error = 100.0 * free.relative_error
         tried.append(
             Tried(
-                one.value + move * step,
+                estimate.value + move * step,
                 move * _STEP if std is not None else None,
                 here - _log_likelihood(hers, place, move * step),
                 float(error) if np.isfinite(error) else None,
@@ -161,21 +161,21 @@ def what_if(
             )
         )
     progress(moves.size, moves.size, "tried")
-    return WhatIf(vessel, hers.parameter_set, parameter, one.unit, one.value, std, run, tuple(tried))
+    return WhatIf(vessel, hers.parameter_set, parameter, estimate.unit, estimate.value, std, run, tuple(tried))
 
 
 def _run(hers: BoundRuns, segment_id: str | None) -> BoundRun:
     if segment_id:
-        found = [one for one in hers.runs if one.segment.segment_id.startswith(segment_id)]
-        if len(found) != 1:
+        runs = [run for run in hers.runs if run.segment.segment_id.startswith(segment_id)]
+        if len(runs) != 1:
             raise NotFound(
                 "no_run",
-                f"{segment_id[:40]!r} is {'several' if found else 'none'} of the manoeuvres that can be predicted.",
-                "Choose one of " + ", ".join(one.segment.segment_id for one in hers.runs) + ".",
+                f"{segment_id[:40]!r} is {'several' if runs else 'none'} of the manoeuvres that can be predicted.",
+                "Choose one of " + ", ".join(run.segment.segment_id for run in hers.runs) + ".",
             )
-        return found[0]
-    among = [one for one in hers.runs if one.held_out] or list(hers.runs)
-    return max(among, key=lambda one: free_run_of(one.filtered, hers.hull, hers.values).relative_error)
+        return runs[0]
+    among = [run for run in hers.runs if run.held_out] or list(hers.runs)
+    return max(among, key=lambda run: free_run_of(run.filtered, hers.hull, hers.values).relative_error)
 
 
 def _moved(hers: BoundRuns, place: int, by: float) -> tuple[Float, Float]:
@@ -187,11 +187,11 @@ def _moved(hers: BoundRuns, place: int, by: float) -> tuple[Float, Float]:
 def _log_likelihood(hers: BoundRuns, place: int, by: float) -> float:
     """Return that of the manoeuvres that the set was fitted to; of all where none of them is left."""
     hull, values = _moved(hers, place, by)
-    fitted = [one for one in hers.runs if not one.held_out] or list(hers.runs)
-    return float(sum(passed(one.filtered, Point(hull, values, one.levels.own)).log_likelihood for one in fitted))
+    fitted = [run for run in hers.runs if not run.held_out] or list(hers.runs)
+    return float(sum(passed(run.filtered, Point(hull, values, run.levels.own)).log_likelihood for run in fitted))
 
 
-def series_of(found: WhatIf, most: int) -> Mapping[str, Any]:
+def series_of(answer: WhatIf, most: int) -> Mapping[str, Any]:
     """Return what is drawn of it as JSON content, at most so many instants.
 
     Returns
@@ -200,7 +200,7 @@ def series_of(found: WhatIf, most: int) -> Mapping[str, Any]:
         ``measured``: lists by column, see `WhatIf.measured`; ``predicted``: one such
         mapping for each value tried.
     """
-    measured = found.measured()
+    measured = answer.measured()
     step = max(1, -(-measured["time_s"].size // most))
 
     def thinned(columns: Mapping[str, Float]) -> dict[str, list[float | None]]:
@@ -211,5 +211,5 @@ def series_of(found: WhatIf, most: int) -> Mapping[str, Any]:
 
     return {
         "measured": thinned(measured),
-        "predicted": [thinned(found.predicted(one)) for one in found.tried],
+        "predicted": [thinned(answer.predicted(attempt)) for attempt in answer.tried],
     }

@@ -32,7 +32,7 @@ def together_or_each(items: Mapping[str, T], store: Callable[[Sequence[T]], obje
         if len(items) == 1:
             return dict.fromkeys(items, wrapped(error))
         failed: dict[str, KempfError] = {}
-        for name, one in items.items():
-            failed |= together_or_each({name: one}, store)
+        for name, item in items.items():
+            failed |= together_or_each({name: item}, store)
         return failed
     return {}

@@ -55,15 +55,15 @@ def setting(name: str, environment: Mapping[str, str] | None = None) -> str | No
 
 def log_level(environment: Mapping[str, str] | None = None) -> str | None:
     """Return from which level on something is logged, None where nothing sets it; errors are those of `setting`."""
-    found = in_force("log_level", environment)
-    if found.value is not None and found.value not in get_args(LogLevel):
+    level = in_force("log_level", environment)
+    if level.value is not None and level.value not in get_args(LogLevel):
         raise UsageError(
             "log_level_unknown",
-            f"{found.source} sets the log level {found.value!r}; expected one of {', '.join(get_args(LogLevel))}.",
+            f"{level.source} sets the log level {level.value!r}; expected one of {', '.join(get_args(LogLevel))}.",
             "Give one of these.",
-            {"found": found.value},
+            {"found": level.value},
         )
-    return found.value
+    return level.value
 
 
 def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting:

@@ -66,12 +66,12 @@ class FitReport:
         self._climb += 1
         self._show(last, fitted=True)
 
-    def _show(self, one: Iteration, *, fitted: bool) -> None:
-        if not np.isfinite(one.log_likelihood):
+    def _show(self, iteration: Iteration, *, fitted: bool) -> None:
+        if not np.isfinite(iteration.log_likelihood):
             return
         self._iteration += 1
-        error = float(one.error) if np.isfinite(one.error) else None
-        figures = Figures(self._iteration, self._climb, float(one.log_likelihood), error, fitted)
+        error = float(iteration.error) if np.isfinite(iteration.error) else None
+        figures = Figures(self._iteration, self._climb, float(iteration.log_likelihood), error, fitted)
         if isinstance(self._progress, FitProgress):
             self._progress.iterated(*self._far, self._what, figures)
         else:

@@ -61,9 +61,9 @@ def readings_averaged(log: Series) -> float:
     lasting = max(_likelihood(power, shape) for shape in _lasting(w))
     means = [_mean(w, many) for many in range(2, _LONGEST + 1)]
     lengths = {2.0 + k: mean for k, mean in enumerate(means)}
-    lengths |= {2.5 + k: 0.5 * (one + more) for k, (one, more) in enumerate(pairwise(means))}
+    lengths |= {2.5 + k: 0.5 * (shorter + longer) for k, (shorter, longer) in enumerate(pairwise(means))}
     shapes = ((many, shape + fresh) for many, shape in lengths.items() for fresh in _FRESH)
-    best, shape = max(shapes, key=lambda one: _likelihood(power, one[1]))
+    best, shape = max(shapes, key=lambda candidate: _likelihood(power, candidate[1]))
     return best if _likelihood(power, shape) > lasting + _LEAST_GAIN and _fits(power, shape) else 1.0
 
 

@@ -55,5 +55,5 @@ def make_grid(series: dict[str, Series], start_ns: int, end_ns: int, step_s: flo
     """
     step_ns = round(step_s * SECOND_NS)
     time = np.arange(start_ns, end_ns + 1, step_ns, dtype=np.int64)
-    columns = {name: one.at(time, gap_limit_s(one)) for name, one in series.items()}
+    columns = {name: channel.at(time, gap_limit_s(channel)) for name, channel in series.items()}
     return Grid(time, step_ns / SECOND_NS, columns)

@@ -84,11 +84,11 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
         values = rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
         del rows
-        found, std_s = _at_instants(group, time, values, source, notes)
-        series |= found
-        sources |= dict.fromkeys(found, source)
+        channels, std_s = _at_instants(group, time, values, source, notes)
+        series |= channels
+        sources |= dict.fromkeys(channels, source)
         if std_s > 0.0:
-            unsure |= dict.fromkeys(found, std_s)
+            unsure |= dict.fromkeys(channels, std_s)
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)

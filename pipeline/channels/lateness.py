@@ -74,16 +74,16 @@ def _regressed(left: list[Float], columns: list[Float]) -> Lateness | None:
     """
     best: tuple[float, Float, Float] | None = None
     for gain in _GAINS:
-        y = np.concatenate([_innovations(one[:, None], gain)[:, 0] for one in left])
-        A = np.concatenate([_innovations(one, gain) for one in columns])
+        y = np.concatenate([_innovations(part[:, None], gain)[:, 0] for part in left])
+        A = np.concatenate([_innovations(part, gain) for part in columns])
         size = np.linalg.norm(A, axis=0)
         A = A[:, size > 1e-12 * max(float(np.max(size)), 1e-300)]
         missed = float(np.sum((y - A @ np.linalg.lstsq(A, y, rcond=1e-10)[0]) ** 2))
         if best is None or missed < best[0]:
             best = missed, A, y
     assert best is not None
-    found = fit(best[1], best[2])
-    return None if found is None else Lateness(float(found.value[0]), float(found.std[0]))
+    line = fit(best[1], best[2])
+    return None if line is None else Lateness(float(line.value[0]), float(line.std[0]))
 
 
 def _innovations(columns: Float, gain: float) -> Float:

@@ -62,11 +62,13 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
         Bounds of the segment, UTC ns.
     """
     around = _AROUND_S * SECOND_NS
-    near = {name: one.between(start_utc_ns - around, end_utc_ns + around) for name, one in instruments.series.items()}
+    near = {
+        name: series.between(start_utc_ns - around, end_utc_ns + around) for name, series in instruments.series.items()
+    }
     # what holds values that are no numbers is refused later, by name
-    own = {name: one for name, one in near.items() if len(one) > 1 and np.all(np.isfinite(one.value))}
+    own = {name: series for name, series in near.items() if len(series) > 1 and np.all(np.isfinite(series.value))}
     changed: dict[str, Series] = {}
-    said = []
+    sentences = []
     # of a velocity that was turned out of the ship's frame it is not known what was smoothed
     late = _velocity_lateness(own) if "velocity_forward" not in own else None
     late_std_s, slope, mean_s = 0.0, None, 0.0
@@ -77,21 +79,21 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
         if late.late_s > _SURE * late.std_s:
             late_std_s = late.std_s
             changed |= unsmoothed(speed, course, late.late_s)
-            said.append(f"the GNSS velocity is {size}, as where it is smoothed: undone")
+            sentences.append(f"the GNSS velocity is {size}, as where it is smoothed: undone")
         else:
             # it may not be late at all, and is off by so much where it is
             late_std_s = late.late_s
-            said.append(
+            sentences.append(
                 f"the GNSS velocity may be {size}: too little to be undone, and among what is not known of its instants"
             )
     log = own.get("speed_through_water")
     many = readings_averaged(log) if log is not None else 1.0
     if log is not None and many > 1.0:
         changed["speed_through_water"], mean_s = apart(log, many), many * log.period_s
-        said.append(f"the speed log shows means over {mean_s:.2g} s: taken at their middle, one after the other")
+        sentences.append(f"the speed log shows means over {mean_s:.2g} s: taken at their middle, one after the other")
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
     errors = instant_errors(instruments.instant_std_s, late_std_s)
-    return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
+    return Punctual(whole, (*sentences, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
 
 
 def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
@@ -100,9 +102,9 @@ def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
     track, velocity = log.track(), log.velocity("course")
     if track is None or velocity is None:
         return None
-    found = velocity_lateness(track, velocity)
+    lateness = velocity_lateness(track, velocity)
     least = _FINEST * series["course_over_ground"].period_s
-    return found if found is not None and found.late_s > max(_POSSIBLE * found.std_s, least) else None
+    return lateness if lateness is not None and lateness.late_s > max(_POSSIBLE * lateness.std_s, least) else None
 
 
 def unsmoothed(speed: Series, course: Series, late_s: float) -> dict[str, Series]:

@@ -111,15 +111,15 @@ class _Search:
         self._smoothers = {order: Smoother(time, self._columns, order) for order in _LEFT}
         widest = np.log(np.clip(len(series) / _PART_OF_SERIES, 1.0, _WIDEST))
         widths = np.arange(np.log(_NARROWEST), widest + _STEP, _STEP)
-        found = [self.at(order, width) for order in _LEFT for width in widths]
-        top = max(found, key=lambda one: one.log_likelihood)
+        candidates = [self.at(order, width) for order in _LEFT for width in widths]
+        top = max(candidates, key=lambda candidate: candidate.log_likelihood)
 
         def unlikely(width: float) -> float:
             return -self.at(top.order, width).log_likelihood
 
         bounds = max(top.log_width - _STEP, widths[0]), min(top.log_width + _STEP, widths[-1])
         closer = minimize_scalar(unlikely, bounds=bounds, method="bounded", options={"xatol": 0.02})
-        self.best = max(top, self.at(top.order, float(closer.x)), key=lambda one: one.log_likelihood)
+        self.best = max(top, self.at(top.order, float(closer.x)), key=lambda candidate: candidate.log_likelihood)
 
     def at(self, order: int, log_width: float) -> _Candidate:
         """Return the likeliest multiple at one width.
@@ -150,14 +150,14 @@ class _Search:
         of_best = best, float(multiples[best]), float(variances[best]), around
         return _Candidate(float(likely[best]), order, log_width, *of_best)
 
-    def laid(self, one: _Candidate) -> tuple[Float, float]:
+    def laid(self, candidate: _Candidate) -> tuple[Float, float]:
         """Return the signal, shape (n,), and the standard error that the multiple brings in."""
-        smooth = self._smoothers[one.order].smooth(_penalty(one.order, one.log_width))
+        smooth = self._smoothers[candidate.order].smooth(_penalty(candidate.order, candidate.log_width))
         value: Float = smooth[:, 0]
-        if not one.shape:
+        if not candidate.shape:
             return value, 0.0
-        rough = self._columns[:, one.shape] - smooth[:, one.shape]
-        return value + one.multiple * rough, float(np.sqrt(one.multiple_variance * np.mean(rough**2)))
+        rough = self._columns[:, candidate.shape] - smooth[:, candidate.shape]
+        return value + candidate.multiple * rough, float(np.sqrt(candidate.multiple_variance * np.mean(rough**2)))
 
 
 def _penalty(order: int, log_width: float) -> float:

@@ -26,7 +26,7 @@ EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))
 _FEWEST = 20
 
 
-def by_band(looked: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
+def by_band(residuals: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
     """Return what each band of frequencies holds, by channel.
 
     Returns
@@ -36,12 +36,12 @@ def by_band(looked: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
         when white) with its 99 % ``band``, ``outside``, ``p_value`` of a ratio as large, ``peak_hz`` where the power is
         largest, and ``free_run_rms``: the free run's error within the band, in ``unit``.
     """
-    found = {}
+    by_channel = {}
     for i, name in enumerate(CHANNELS):
-        parts = [part for part in (_spectra(one, i) for one in looked) if part is not None]
+        parts = [part for part in (_spectra(run, i) for run in residuals) if part is not None]
         if parts:
-            found[name] = _bands(parts, name)
-    return found
+            by_channel[name] = _bands(parts, name)
+    return by_channel
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +57,15 @@ class _Spectra:
     error: Float
 
 
-def _spectra(one: Looked, channel: int) -> _Spectra | None:
-    z, e = one.whitened[:, channel], one.free.error[:, channel]
-    made, known = np.flatnonzero(np.isfinite(z)), np.isfinite(e)
-    if made.size < _FEWEST:
+def _spectra(run: Looked, channel: int) -> _Spectra | None:
+    z, e = run.whitened[:, channel], run.free.error[:, channel]
+    instants, known = np.flatnonzero(np.isfinite(z)), np.isfinite(e)
+    if instants.size < _FEWEST:
         return None
-    stride = max(1, round(float(np.median(np.diff(made)))))
-    frequency: Float = np.fft.rfftfreq(z.size, one.filtered.run.step_s).astype(np.float64)
-    kept = (frequency > 0.0) & (frequency <= 0.5 / (one.filtered.run.step_s * stride) * (1.0 + 1e-9))
-    power: Float = np.abs(np.fft.rfft(np.nan_to_num(z))) ** 2 / made.size
+    stride = max(1, round(float(np.median(np.diff(instants)))))
+    frequency: Float = np.fft.rfftfreq(z.size, run.filtered.run.step_s).astype(np.float64)
+    kept = (frequency > 0.0) & (frequency <= 0.5 / (run.filtered.run.step_s * stride) * (1.0 + 1e-9))
+    power: Float = np.abs(np.fft.rfft(np.nan_to_num(z))) ** 2 / instants.size
     # both halves of the spectrum, and the mirror images of a channel that is measured at some instants only
     twice = 2.0 * stride / (z.size * max(int(np.count_nonzero(known)), 1))
     error: Float = twice * np.abs(np.fft.rfft(np.where(known, np.nan_to_num(e), 0.0))) ** 2
@@ -77,7 +77,7 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
     frequency, power, error = (
         np.concatenate([getattr(part, of) for part in parts]) for of in ("frequency", "power", "error")
     )
-    whole, found = float(np.sum(power)), []
+    whole, bands = float(np.sum(power)), []
     edges = [0.0, *EDGES_HZ]
     for low, high in pairwise(edges):
         inside = (frequency >= low) & (frequency < high)
@@ -87,7 +87,7 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
         share, expected = float(np.sum(power[inside])) / whole, k / frequency.size
         bounds = beta_quantile(np.array([0.5 - BAND / 2.0, 0.5 + BAND / 2.0]), k, rest) / expected
         ratio = share / expected
-        found.append(
+        bands.append(
             {
                 "low_hz": low,
                 "high_hz": min(high, float(np.max(frequency))),
@@ -102,4 +102,4 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
                 "unit": unit,
             }
         )
-    return found
+    return bands

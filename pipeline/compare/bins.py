@@ -40,16 +40,16 @@ class Bin:
 
 def phases(samples: Samples) -> dict[str, Mask]:
     """Return the instants of each phase that there is, shape (N,) each, in the order of a leg."""
-    found = {name: samples.phase == name for name in _PHASES}
-    return {name: inside for name, inside in found.items() if inside.any()}
+    masks = {name: samples.phase == name for name in _PHASES}
+    return {name: inside for name, inside in masks.items() if inside.any()}
 
 
 def sides(samples: Samples) -> dict[str, Mask]:
     """Return the instants with the rudder to starboard, to port, and amidships, shape (N,) each."""
     rudder = samples.rudder_rad
     small = _AMIDSHIPS * float(np.max(np.abs(rudder)))
-    found = {"starboard": rudder > small, "port": rudder < -small, "amidships": np.abs(rudder) <= small}
-    return {name: inside for name, inside in found.items() if inside.any()}
+    masks = {"starboard": rudder > small, "port": rudder < -small, "amidships": np.abs(rudder) <= small}
+    return {name: inside for name, inside in masks.items() if inside.any()}
 
 
 def runs(samples: Samples) -> dict[str, Mask]:
@@ -63,22 +63,26 @@ def bins(samples: Samples) -> dict[str, list[Bin]]:
     The outermost are open; those of the heading are sectors of the compass round N, NE, ...
     """
     degrees = float(np.rad2deg(1.0))
-    asked: tuple[tuple[str, Float, str, Callable[[Float], Float]], ...] = (
+    quantities: tuple[tuple[str, Float, str, Callable[[Float], Float]], ...] = (
         ("lateral_speed", samples.lateral_speed_m_s, "m/s", _symmetric),
         ("yaw_rate", degrees * samples.yaw_rate_rad_s, "deg/s", _symmetric),
         ("rudder", degrees * samples.rudder_rad, "deg", _symmetric),
         ("speed", samples.speed_m_s, "m/s", _spanning),
     )
-    found = {}
-    for name, value, unit, edges_of in asked:
+    by_quantity = {}
+    for name, value, unit, edges_of in quantities:
         inner = edges_of(value)
         place = np.searchsorted(inner, value, side="right")
         bounds = [None, *inner.tolist(), None]
-        found[name] = [Bin(bounds[k], bounds[k + 1], unit, place == k) for k in range(len(bounds) - 1)]
+        by_quantity[name] = [Bin(bounds[k], bounds[k + 1], unit, place == k) for k in range(len(bounds) - 1)]
     sector = 360.0 / _COURSES
     place = (np.floor((degrees * samples.heading_rad) / sector + 0.5) % _COURSES).astype(np.int64)
-    found["heading"] = [Bin((k - 0.5) * sector % 360.0, (k + 0.5) * sector, "deg", place == k) for k in range(_COURSES)]
-    return {name: [one for one in made if one.inside.any()] for name, made in found.items()}
+    by_quantity["heading"] = [
+        Bin((k - 0.5) * sector % 360.0, (k + 0.5) * sector, "deg", place == k) for k in range(_COURSES)
+    ]
+    return {
+        name: [interval for interval in intervals if interval.inside.any()] for name, intervals in by_quantity.items()
+    }
 
 
 def grouped(samples: Samples, of: dict[str, Mask]) -> dict[str, Any]:
@@ -89,8 +93,11 @@ def grouped(samples: Samples, of: dict[str, Mask]) -> dict[str, Any]:
 def binned(samples: Samples, of: dict[str, list[Bin]]) -> dict[str, list[dict[str, Any]]]:
     """Return groups by bins, with ``low`` and ``high`` in ``unit``."""
     return {
-        name: [{"low": one.low, "high": one.high, "unit": one.unit, **group(samples, one.inside)} for one in made]
-        for name, made in of.items()
+        name: [
+            {"low": interval.low, "high": interval.high, "unit": interval.unit, **group(samples, interval.inside)}
+            for interval in intervals
+        ]
+        for name, intervals in of.items()
     }
 
 

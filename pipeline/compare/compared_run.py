@@ -53,18 +53,18 @@ def compare_run(
     """
     run = filtered.run
     own = point if own_levels is None else Point(point.hull, point.values, own_levels)
-    found = free_run_of(filtered, point.hull, point.values)
-    free = of_free_run(filtered, found, horizon_of("free"))
+    free_run = free_run_of(filtered, point.hull, point.values)
+    free = of_free_run(filtered, free_run, horizon_of("free"))
     return ComparedRun(
         name=run.name,
         held_out=held_out,
         predicted=free if horizon.kind == "free run" else predict(filtered, point, horizon),
         free=free,
-        free_run_error=found.relative_error,
+        free_run_error=free_run.relative_error,
         overshoots=compare_overshoots(
-            run.time_s, run.measured[:, _HEADING], found.predicted[:, _HEADING], tuple(turns)
+            run.time_s, run.measured[:, _HEADING], free_run.predicted[:, _HEADING], tuple(turns)
         ),
-        looked=Looked(filtered, sensitivity.passed(filtered, own), found, tuple(phases)),
+        looked=Looked(filtered, sensitivity.passed(filtered, own), free_run, tuple(phases)),
         levels_from=levels_from,
         free_run_error_by_legs=None if legs is None else free_run_of(filtered, *legs).relative_error,
     )

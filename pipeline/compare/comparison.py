@@ -54,22 +54,22 @@ class ComparedRun:
 
     def show(self) -> dict[str, Any]:
         """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
-        one = self.predicted
-        rms = one.rms()
+        predicted = self.predicted
+        rms = predicted.rms()
         display = {name: {"value": UNITS[name][1] * rms[name], "unit": UNITS[name][0]} for name in ORDER if name in rms}
         return {
             "segment_id": self.name,
             "held_out": self.held_out,
             "sample": self.sample,
-            "fit_percent": _ordered(one.fit_percent()),
+            "fit_percent": _ordered(predicted.fit_percent()),
             "rms": _ordered(rms),
             "rms_unit": {name: _SI[name] for name in ORDER if name in rms},
             "rms_display": display,
             "rms_told": display,  # as it was called up to 0.1
-            "n": _ordered(one.count()),
-            "left_out_settling": one.settling,
+            "n": _ordered(predicted.count()),
+            "left_out_settling": predicted.settling,
             "inside_95_percent": {
-                name: {"share": k / n, "inside": k, "of": n} for name, (k, n) in _ordered(one.inside_95()).items()
+                name: {"share": k / n, "inside": k, "of": n} for name, (k, n) in _ordered(predicted.inside_95()).items()
             },
             "overshoot_error_deg": [turn.error_deg for turn in self.overshoots],
             "overshoot_horizon": "free",
@@ -88,8 +88,8 @@ class ComparedRun:
         }
 
 
-def _ordered(found: dict[str, Any]) -> dict[str, Any]:
-    return {name: found[name] for name in ORDER if name in found}
+def _ordered(by_channel: dict[str, Any]) -> dict[str, Any]:
+    return {name: by_channel[name] for name in ORDER if name in by_channel}
 
 
 def _started_from(run: ComparedRun) -> dict[str, Any]:
@@ -135,11 +135,11 @@ def summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
         ``mean_size``, ``n`` and ``not_predicted``, ``free_run_error_percent``, and the same fitted to legs, None where
         those predict no better.
     """
-    found: dict[str, Any] = {}
+    by_sample: dict[str, Any] = {}
     for sample in (FITTED, HELD_OUT):
         of = [run for run in runs if run.sample == sample]
-        found[sample] = _summary(of) if of else None
-    return found
+        by_sample[sample] = _summary(of) if of else None
+    return by_sample
 
 
 def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
@@ -149,12 +149,15 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     there = [name for name in ORDER if any(name in fit for fit in fits)]
     covered = {}
     for name in there:
-        counts = [one[name] for one in inside if name in one]
+        counts = [by_channel[name] for by_channel in inside if name in by_channel]
         if counts:
             k, n = (sum(column) for column in zip(*counts, strict=True))
             covered[name] = {"share": k / n, "inside": k, "of": n}
     display = {
-        name: {**_mean([UNITS[name][1] * one[name] for one in rms if name in one]), "unit": UNITS[name][0]}
+        name: {
+            **_mean([UNITS[name][1] * by_channel[name] for by_channel in rms if name in by_channel]),
+            "unit": UNITS[name][0],
+        }
         for name in there
     }
     errors = [turn.error_deg for run in runs for turn in run.overshoots]

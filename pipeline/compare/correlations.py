@@ -26,7 +26,7 @@ _WIDTH = float(normal_quantile(0.5 + BAND / 2.0))
 _FEWEST_PAIRS = 20
 
 
-def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
+def correlations(residuals: Sequence[Looked]) -> dict[str, Any]:
     """Return auto- and cross-correlations of every channel's whitened innovations, over all runs together.
 
     Returns
@@ -39,26 +39,26 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
         any of the lags (Bonferroni); of ``auto`` also ``ljung_box``, its degrees of freedom and p-value. A positive
         lag: what was given came first.
     """
-    step = looked[0].filtered.run.step_s
+    step = residuals[0].filtered.run.step_s
     most = int(min(_LONGEST_S / step, _MOST))
-    given = [given_to(one.filtered.run) for one in looked]
-    names = [name for name in given[0] if all(name in one for one in given)]
-    found: dict[str, Any] = {}
+    given = [given_to(run.filtered.run) for run in residuals]
+    names = [name for name in given[0] if all(name in series for series in given)]
+    by_channel: dict[str, Any] = {}
     for i, channel in enumerate(CHANNELS):
-        z = [one.whitened[:, i] for one in looked]
+        z = [run.whitened[:, i] for run in residuals]
         if sum(int(np.count_nonzero(np.isfinite(column))) for column in z) < _FEWEST_PAIRS:
             continue
         lags = list(range(1, most + 1))
         auto, pairs = _pooled(z, z, lags)
         cross = {}
         for name in names:
-            rho, counts = _pooled(z, [one[name] for one in given], [0, *lags])
+            rho, counts = _pooled(z, [series[name] for series in given], [0, *lags])
             cross[name] = _summary(rho, counts, step * np.array([0, *lags]))
-        found[channel] = {
+        by_channel[channel] = {
             "auto": {**_summary(auto, pairs, step * np.array(lags)), **_ljung_box(auto, pairs)},
             "cross": cross,
         }
-    return found
+    return by_channel
 
 
 def given_to(run: GridRun) -> dict[str, Float]:
@@ -82,16 +82,16 @@ def _pooled(z: Sequence[Float], other: Sequence[Float], lags: Sequence[int]) -> 
     """Return the correlation of z now with the other so many steps before, and the number of pairs, over all runs."""
     rho, pairs = np.full(len(lags), np.nan), np.zeros(len(lags))
     for k, lag in enumerate(lags):
-        product, one, two, count = 0.0, 0.0, 0.0, 0
+        product, power_now, power_before, count = 0.0, 0.0, 0.0, 0
         for a, b in zip(z, other, strict=True):
             now, before = (a[lag:], b[: b.size - lag]) if lag else (a, b)
             good = np.isfinite(now) & np.isfinite(before)
             product += float(now[good] @ before[good])
-            one += float(now[good] @ now[good])
-            two += float(before[good] @ before[good])
+            power_now += float(now[good] @ now[good])
+            power_before += float(before[good] @ before[good])
             count += int(np.count_nonzero(good))
-        if count >= _FEWEST_PAIRS and one > 0.0 and two > 0.0:
-            rho[k], pairs[k] = product / np.sqrt(one * two), count
+        if count >= _FEWEST_PAIRS and power_now > 0.0 and power_before > 0.0:
+            rho[k], pairs[k] = product / np.sqrt(power_now * power_before), count
     return rho, pairs
 
 

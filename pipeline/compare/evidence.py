@@ -50,21 +50,23 @@ def evidence_in(where: Mapping[str, Any]) -> list[Evidence]:
     where : mapping
         See `kempf.pipeline.compare.misfit.where`, by sample; None where there are no such manoeuvres.
     """
-    found = [one for sample, _ in SAMPLES if where[sample] is not None for one in _of_sample(sample, where[sample])]
-    found.sort(key=lambda one: (one.probability, -one.strength))
+    evidence = [
+        finding for sample, _ in SAMPLES if where[sample] is not None for finding in _of_sample(sample, where[sample])
+    ]
+    evidence.sort(key=lambda finding: (finding.probability, -finding.strength))
     # of what is as unlikely, something of every kind before the second of one
     seen: Counter[tuple[float, str]] = Counter()
     places = []
-    for one in found:
-        kind = (one.probability, ITSELF if one.which == ITSELF else one.of.partition(" ")[0])
-        places.append((one.probability, seen[kind]))
+    for finding in evidence:
+        kind = (finding.probability, ITSELF if finding.which == ITSELF else finding.of.partition(" ")[0])
+        places.append((finding.probability, seen[kind]))
         seen[kind] += 1
-    order = sorted(range(len(found)), key=lambda k: places[k])
-    return [found[k] for k in order[:MOST]]
+    order = sorted(range(len(evidence)), key=lambda k: places[k])
+    return [evidence[k] for k in order[:MOST]]
 
 
-def _of_sample(sample: str, one: Mapping[str, Any]) -> Iterator[Evidence]:
-    for entry in one["stands_out"]:
+def _of_sample(sample: str, misfit: Mapping[str, Any]) -> Iterator[Evidence]:
+    for entry in misfit["stands_out"]:
         of, which, channel = entry["of"], str(entry["which"]), entry["channel"]
         yield Evidence(
             f"errors of {_words(channel)} are {entry['whitened_rms']:.2f} times as large as the model says: "
@@ -72,7 +74,7 @@ def _of_sample(sample: str, one: Mapping[str, Any]) -> Iterator[Evidence]:
             *(sample, channel, of, which, float(entry["p_adjusted"])),
             strength=entry["n"] * entry["whitened_rms"] ** 2,
         )
-    for channel, entry in one["correlations"].items():
+    for channel, entry in misfit["correlations"].items():
         own = entry["auto"]["p_value"]
         if own is not None and own < LEVEL:
             words = f"errors of {_words(channel)} one step ahead are correlated in time"
@@ -87,8 +89,8 @@ def _of_sample(sample: str, one: Mapping[str, Any]) -> Iterator[Evidence]:
                 )
                 p, lag_s = float(cross["p_adjusted"]), float(cross["largest_lag_s"])
                 yield Evidence(words, sample, channel, "correlation", name, p, lag_s, abs(cross["largest"]))
-    count = sum(len(bands) for bands in one["by_band"].values())
-    for channel, bands in one["by_band"].items():
+    count = sum(len(bands) for bands in misfit["by_band"].values())
+    for channel, bands in misfit["by_band"].items():
         out = [band for band in bands if count * band["p_value"] < LEVEL]
         if out:
             most = max(out, key=lambda band: float(band["ratio"]))

@@ -20,12 +20,12 @@ from kempf.pipeline.predict.run_residuals import Looked, Samples, samples_of
 MARKED = 0.1
 
 
-def marks(looked: Sequence[Looked], evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
+def marks(residuals: Sequence[Looked], evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
     """Return the instants at which evidence shows.
 
     Parameters
     ----------
-    looked : sequence of Looked
+    residuals : sequence of Looked
         All runs of a sample; at least one.
     evidence : sequence of Evidence
         Of that sample.
@@ -36,32 +36,32 @@ def marks(looked: Sequence[Looked], evidence: Sequence[Evidence]) -> dict[str, d
         By `Evidence.key` and run, shape (n,) each. What shows at no instants of its own, such as power in a band of
         frequencies, is left out.
     """
-    samples, found = samples_of(looked), {}
-    names = [one.filtered.run.name for one in looked]
-    ends = np.cumsum([one.filtered.run.time_s.size for one in looked])
-    for one in evidence:
-        inside = _contributing(looked, one) if one.of == "correlation" else _group(samples, one)
+    samples, masks = samples_of(residuals), {}
+    names = [run.filtered.run.name for run in residuals]
+    ends = np.cumsum([run.filtered.run.time_s.size for run in residuals])
+    for finding in evidence:
+        inside = _contributing(residuals, finding) if finding.of == "correlation" else _group(samples, finding)
         if inside is not None:
-            found[one.key] = dict(zip(names, np.split(inside, ends[:-1]), strict=True))
-    return found
+            masks[finding.key] = dict(zip(names, np.split(inside, ends[:-1]), strict=True))
+    return masks
 
 
-def _group(samples: Samples, one: Evidence) -> Mask | None:
+def _group(samples: Samples, finding: Evidence) -> Mask | None:
     """Return the instants of a group, shape (N,); None where it is none of instants."""
-    if one.of.startswith("by_bin "):
-        made = bins(samples)[one.of.removeprefix("by_bin ")]
-        return next(b.inside for b in made if b.words == one.which)
-    groups = {"by_phase": phases, "by_side": sides, "by_run": runs}.get(one.of)
-    return None if groups is None else groups(samples)[one.which]
+    if finding.of.startswith("by_bin "):
+        intervals = bins(samples)[finding.of.removeprefix("by_bin ")]
+        return next(b.inside for b in intervals if b.words == finding.which)
+    groups = {"by_phase": phases, "by_side": sides, "by_run": runs}.get(finding.of)
+    return None if groups is None else groups(samples)[finding.which]
 
 
-def _contributing(looked: Sequence[Looked], one: Evidence) -> Mask:
+def _contributing(residuals: Sequence[Looked], finding: Evidence) -> Mask:
     """Return the instants that contribute most to a correlation, shape (N,)."""
     parts = []
-    for run in looked:
-        z = run.whitened[:, CHANNELS.index(one.channel)]
-        other = z if one.which == ITSELF else given_to(run.filtered.run)[one.which]
-        lag = round(one.lag_s / run.filtered.run.step_s)
+    for run in residuals:
+        z = run.whitened[:, CHANNELS.index(finding.channel)]
+        other = z if finding.which == ITSELF else given_to(run.filtered.run)[finding.which]
+        lag = round(finding.lag_s / run.filtered.run.step_s)
         part = np.full(z.size, np.nan)
         part[lag:] = z[lag:] * other[: other.size - lag]
         parts.append(part)

@@ -20,12 +20,12 @@ from kempf.pipeline.predict.run_residuals import Looked, samples_of
 _NAMED = 6
 
 
-def where(looked: Sequence[Looked]) -> dict[str, Any]:
+def where(residuals: Sequence[Looked]) -> dict[str, Any]:
     """Say where a model fails.
 
     Parameters
     ----------
-    looked : sequence of Looked
+    residuals : sequence of Looked
         All fitted, or all held out; at least one.
 
     Returns
@@ -36,7 +36,7 @@ def where(looked: Sequence[Looked]) -> dict[str, Any]:
         than a right model leaves in any of so many groups with probability 99 % (Bonferroni), the least likely first,
         with ``of``, ``which``, ``channel``, ``n``, ``whitened_rms``, ``band``, ``p_adjusted``.
     """
-    samples = samples_of(looked)
+    samples = samples_of(residuals)
     groups = {"by_phase": grouped(samples, phases(samples)), "by_side": grouped(samples, sides(samples))}
     of_bins, of_runs = bins(samples), grouped(samples, runs(samples))
     by_bin = binned(samples, of_bins)
@@ -45,9 +45,9 @@ def where(looked: Sequence[Looked]) -> dict[str, Any]:
         **groups,
         "by_bin": by_bin,
         "by_run": of_runs,
-        "by_band": by_band(looked),
-        "correlations": correlations(looked),
-        "worst": worst(looked),
+        "by_band": by_band(residuals),
+        "correlations": correlations(residuals),
+        "worst": worst(residuals),
         "stands_out": _stands_out({**groups, "by_run": of_runs}, of_bins, by_bin),
     }
 
@@ -55,16 +55,16 @@ def where(looked: Sequence[Looked]) -> dict[str, Any]:
 def _stands_out(
     named: dict[str, dict[str, Any]], of_bins: dict[str, list[Bin]], by_bin: dict[str, list[dict[str, Any]]]
 ) -> list[dict[str, Any]]:
-    entries = [(of, which, one) for of, groups in named.items() for which, one in groups.items()]
+    entries = [(of, which, group) for of, groups in named.items() for which, group in groups.items()]
     for name, groups in by_bin.items():
-        entries += [(f"by_bin {name}", b.words, one) for b, one in zip(of_bins[name], groups, strict=True)]
-    tested = [(of, which, *pair) for of, which, one in entries for pair in one["channels"].items() if pair[1]["n"]]
-    found = []
+        entries += [(f"by_bin {name}", b.words, group) for b, group in zip(of_bins[name], groups, strict=True)]
+    tested = [(of, which, *pair) for of, which, group in entries for pair in group["channels"].items() if pair[1]["n"]]
+    rows = []
     for of, which, channel, reading in tested:
         square = reading["n"] * reading["whitened_rms"] ** 2
         adjusted = min(1.0, len(tested) * chi2_tail(square, reading["n"]))
         if adjusted < 1.0 - BAND:
             kept = {key: reading[key] for key in ("n", "whitened_rms", "band")}
             rank = chi2_log_tail(square, reading["n"])
-            found.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
-    return [entry for _, entry in sorted(found, key=lambda pair: pair[0])[:_NAMED]]
+            rows.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
+    return [entry for _, entry in sorted(rows, key=lambda pair: pair[0])[:_NAMED]]

@@ -53,7 +53,7 @@ def compare_overshoots(
         Heading, rad, unwrapped; the measured one NaN where there is none.
     """
     known = np.isfinite(measured)
-    found = []
+    errors = []
     for turn in turns:
         gained = [
             _gain(time, heading, turn)
@@ -64,8 +64,8 @@ def compare_overshoots(
         if len(gained) == 2 and gained[0] is not None and gained[1] is not None:
             error = float(np.rad2deg(gained[1] - gained[0]))
         predicted_deg = None if error is None else turn.overshoot_deg + error
-        found.append(OvershootError(turn.number, turn.side, turn.overshoot_deg, predicted_deg, error))
-    return tuple(found)
+        errors.append(OvershootError(turn.number, turn.side, turn.overshoot_deg, predicted_deg, error))
+    return tuple(errors)
 
 
 def _gain(time: Float, heading: Float, turn: Turn) -> float | None:
@@ -99,10 +99,10 @@ def turns_of(
     end_s : float
         Of the segment.
     """
-    found = []
+    turns = []
     for number, side, peak_s, overshoot_deg in overshoots:
         before = [t for t in executes_s if t < peak_s]
         if before:
             after = [t for t in executes_s if t > peak_s]
-            found.append(Turn(number, side, max(before), min([*after, end_s]), overshoot_deg))
-    return tuple(found)
+            turns.append(Turn(number, side, max(before), min([*after, end_s]), overshoot_deg))
+    return tuple(turns)

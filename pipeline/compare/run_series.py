@@ -37,17 +37,17 @@ def run_series(run: ComparedRun) -> dict[str, Float | NDArray[np.int64]]:
         ``yaw_rate_rad_s``, what was predicted, as ``yaw_rate_predicted_rad_s``, and, where the model has it, the
         standard deviation of the difference, as ``yaw_rate_std_rad_s``. NaN where nothing was measured or predicted.
     """
-    taken, made = run.looked.filtered.run, run.predicted
+    record, prediction = run.looked.filtered.run, run.predicted
     columns: dict[str, Float | NDArray[np.int64]] = {
-        "time_utc_ns": instants_utc_ns(taken),
-        "rudder_angle_rad": taken.rudder_rad,
-        "speed_through_water_m_s": taken.speed_m_s,
+        "time_utc_ns": instants_utc_ns(record),
+        "rudder_angle_rad": record.rudder_rad,
+        "speed_through_water_m_s": record.speed_m_s,
     }
     for name in ORDER:
         i, unit = CHANNELS.index(name), _UNITS[name]
-        zero = first_heading(taken) if name == "heading" else 0.0
-        columns[f"{name}_{unit}"] = taken.measured[:, i] + zero
-        columns[f"{name}_predicted_{unit}"] = made.predicted[:, i] + zero
-        if np.isfinite(made.std[:, i]).any():
-            columns[f"{name}_std_{unit}"] = made.std[:, i]
+        zero = first_heading(record) if name == "heading" else 0.0
+        columns[f"{name}_{unit}"] = record.measured[:, i] + zero
+        columns[f"{name}_predicted_{unit}"] = prediction.predicted[:, i] + zero
+        if np.isfinite(prediction.std[:, i]).any():
+            columns[f"{name}_std_{unit}"] = prediction.std[:, i]
     return columns

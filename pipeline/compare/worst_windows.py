@@ -19,7 +19,7 @@ _FEWEST = 4
 _MS_NS = 1_000_000
 
 
-def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
+def worst(residuals: Sequence[Looked]) -> list[dict[str, Any]]:
     """Return the windows in which the model errs most, worst first, one step ahead and in the free run.
 
     Returns
@@ -30,40 +30,40 @@ def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
         probability ``p_value`` of as much in a window of a right model, or ``free run`` with ``free_run_rms`` in
         ``unit`` and how many times the channel's own it is. Windows of one channel do not overlap.
     """
-    found = []
+    windows = []
     for i, name in enumerate(CHANNELS):
-        found += _one_step(looked, i, name) + _free(looked, i, name)
+        windows += _one_step(residuals, i, name) + _free(residuals, i, name)
     shown = []
     for measure in ("one step", "free run"):
-        these = [window for window in found if window["measure"] == measure]
+        these = [window for window in windows if window["measure"] == measure]
         these.sort(key=lambda window: -float(window["_rank"]))
         shown += [{k: v for k, v in window.items() if k != "_rank"} for window in these[:_SHOWN]]
     return shown
 
 
-def _one_step(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
-    found = []
-    for run in looked:
+def _one_step(residuals: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+    windows = []
+    for run in residuals:
         for at, mean, count in _windows(run.whitened[:, channel] ** 2):
             probability = chi2_tail(mean * count, count)
             measured = {"whitened_rms": float(np.sqrt(mean)), "p_value": probability}
             rank = -chi2_log_tail(mean * count, count)
-            found.append({**_window(run, at), "channel": name, "measure": "one step", **measured, "_rank": rank})
-    return found
+            windows.append({**_window(run, at), "channel": name, "measure": "one step", **measured, "_rank": rank})
+    return windows
 
 
-def _free(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+def _free(residuals: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
     unit, factor = UNITS[name]
-    whole = np.concatenate([run.free.error[:, channel] for run in looked])
+    whole = np.concatenate([run.free.error[:, channel] for run in residuals])
     if not np.isfinite(whole).any():
         return []
-    usual, found = float(np.nanmean(whole**2)), []
-    for run in looked:
+    usual, windows = float(np.nanmean(whole**2)), []
+    for run in residuals:
         for at, mean, _ in _windows(run.free.error[:, channel] ** 2):
             times = float(np.sqrt(mean / usual)) if usual > 0.0 else 0.0
             measured = {"free_run_rms": factor * float(np.sqrt(mean)), "unit": unit, "times_its_rms": times}
-            found.append({**_window(run, at), "channel": name, "measure": "free run", **measured, "_rank": times})
-    return found
+            windows.append({**_window(run, at), "channel": name, "measure": "free run", **measured, "_rank": times})
+    return windows
 
 
 def _windows(square: Float) -> list[tuple[int, float, int]]:
@@ -74,20 +74,20 @@ def _windows(square: Float) -> list[tuple[int, float, int]]:
     total = np.convolve(np.where(good, np.nan_to_num(square), 0.0), kernel, "valid")
     count = np.round(np.convolve(good.astype(np.float64), kernel, "valid"))
     mean = np.where(count >= _FEWEST, total / np.maximum(count, 1.0), -np.inf)
-    found = []
+    windows = []
     for _ in range(_SHOWN):
         at = int(np.argmax(mean))
         if not np.isfinite(mean[at]):
             break
-        found.append((at, float(mean[at]), int(count[at])))
+        windows.append((at, float(mean[at]), int(count[at])))
         mean[max(0, at - length + 1) : at + length] = -np.inf
-    return found
+    return windows
 
 
-def _window(one: Looked, at: int) -> dict[str, Any]:
-    run = one.filtered.run
+def _window(residuals: Looked, at: int) -> dict[str, Any]:
+    run = residuals.filtered.run
     end = min(at + _WINDOW, run.time_s.size) - 1
-    names, counts = np.unique(one.phase_of[at : end + 1], return_counts=True)
+    names, counts = np.unique(residuals.phase_of[at : end + 1], return_counts=True)
     start_s, end_s = float(run.time_s[at]), float(run.time_s[end])
     return {
         "run": run.name,

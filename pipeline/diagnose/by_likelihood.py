@@ -44,14 +44,14 @@ class Certain:
 
 def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
     """Add what the likelihood is sure of to a ladder."""
-    found = Certain(steps)
-    while len(found.steps) + len(found.immaterial) <= ladder.settings.most_steps:
-        last = found.steps[-1]
-        tried = _refitted(ladder, found)
-        kept = _kept(ladder, found, undecided([pair for pair in tried if pair[1].holds]))
+    findings = Certain(steps)
+    while len(findings.steps) + len(findings.immaterial) <= ladder.settings.most_steps:
+        last = findings.steps[-1]
+        tried = _refitted(ladder, findings)
+        kept = _kept(ladder, findings, undecided([pair for pair in tried if pair[1].holds]))
         if not kept:
-            found.steps[-1] = replace(last, refused=(*last.refused, *tried))
-            found.suspected |= only_fitted(tried)
+            findings.steps[-1] = replace(last, refused=(*last.refused, *tried))
+            findings.suspected |= only_fitted(tried)
             break
         pairs = tuple(pair for pair, _ in kept)
         names = {candidate.effect.name for candidate, _ in pairs}
@@ -60,29 +60,29 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
         weight = weighed(last.ahead, ahead, ladder.probe, confirmation.fit)
         before, ladder.probe = ladder.probe, confirmation.fit
         if not weight.matters:
-            found.immaterial.append(Immaterial(pairs, weight))
+            findings.immaterial.append(Immaterial(pairs, weight))
             continue
         if before is not last.fit:
             # the ladder goes on without what is immaterial
             beside = score(last.fit, candidate.effect, ladder.workers)
             again = ladder.confirmed(last.fit, ladder.unseen(last), beside)
             if not again.holds:
-                found.suspected[candidate.effect.name] = "without what is immaterial beside it nothing of it holds"
+                findings.suspected[candidate.effect.name] = "without what is immaterial beside it nothing of it holds"
                 continue
             pairs = ((beside, again), *pairs[1:])
-        found.steps.append(ladder.stepped(pairs, worse, ahead, None))
-        climbed, idle = found.steps[-1].fit, _idle(found.steps)
+        findings.steps.append(ladder.stepped(pairs, worse, ahead, None))
+        climbed, idle = findings.steps[-1].fit, _idle(findings.steps)
         if idle is not None:
-            found.steps = ladder.without(idle, found.steps)
-        found.steps = _not_superseded(ladder, found.steps)
-        if found.steps[-1].fit is not climbed:
+            findings.steps = ladder.without(idle, findings.steps)
+        findings.steps = _not_superseded(ladder, findings.steps)
+        if findings.steps[-1].fit is not climbed:
             # what was found beside another ladder is looked for again beside this one
-            ladder.probe = found.steps[-1].fit
-            found.immaterial.clear()
-    claimed = {c.effect.name for step in found.steps for c, _ in step.chosen_from}
-    claimed |= {c.effect.name for one in found.immaterial for c, _ in one.chosen_from}
-    found.suspected = {name: why for name, why in sorted(found.suspected.items()) if name not in claimed}
-    return found
+            ladder.probe = findings.steps[-1].fit
+            findings.immaterial.clear()
+    claimed = {c.effect.name for step in findings.steps for c, _ in step.chosen_from}
+    claimed |= {c.effect.name for immaterial in findings.immaterial for c, _ in immaterial.chosen_from}
+    findings.suspected = {name: why for name, why in sorted(findings.suspected.items()) if name not in claimed}
+    return findings
 
 
 def only_fitted(tried: Sequence[tuple[Candidate, Confirmation]]) -> dict[str, str]:
@@ -100,9 +100,9 @@ def only_fitted(tried: Sequence[tuple[Candidate, Confirmation]]) -> dict[str, st
     }
 
 
-def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmation]]:
+def _refitted(ladder: Ladder, findings: Certain) -> list[tuple[Candidate, Confirmation]]:
     """Refit what is certain beside everything found so far."""
-    last, fit = found.steps[-1], ladder.probe
+    last, fit = findings.steps[-1], ladder.probe
     screened: Sequence[Candidate] = last.screened
     alone: Unseen
     if fit is last.fit:
@@ -117,7 +117,7 @@ def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmat
         if ladder.shooting is not None:
             certain = candidate_in_std(fit, candidate, ladder.shooting.horizon_s)
             if certain < ladder.settings.certain_std:
-                found.suspected[candidate.effect.name] = (
+                findings.suspected[candidate.effect.name] = (
                     f"significant one step ahead, but leg by leg only {certain:.1f} standard errors from nothing"
                 )
                 continue
@@ -133,15 +133,15 @@ def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmat
 
 
 def _kept(
-    ladder: Ladder, found: Certain, best: Sequence[tuple[Candidate, Confirmation]]
+    ladder: Ladder, findings: Certain, best: Sequence[tuple[Candidate, Confirmation]]
 ) -> list[tuple[tuple[Candidate, Confirmation], Ahead | None]]:
     """Return those of the best that make no prediction one leg ahead worse, with the model one leg ahead."""
-    last, kept = found.steps[-1], []
+    last, kept = findings.steps[-1], []
     for pair in best:
         effect = pair[0].effect
         ahead = ladder.ahead(last, effect)
         if _worse(last.ahead, ahead):
-            found.suspected[effect.name] = "it makes the prediction one leg ahead worse"
+            findings.suspected[effect.name] = "it makes the prediction one leg ahead worse"
         else:
             kept.append((pair, ahead))
     return kept
@@ -162,7 +162,7 @@ def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
     assert last.added is not None
     for below, step in pairwise(steps[:-1]):
         assert step.added is not None
-        beside = {one.effect.name: one for one in below.screened}
+        beside = {candidate.effect.name: candidate for candidate in below.screened}
         first, second = beside.get(step.added.name), beside.get(last.added.name)
         if first is None or second is None or not alike(first, second) > ALIKE:
             continue

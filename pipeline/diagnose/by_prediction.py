@@ -59,14 +59,14 @@ def _one_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> lis
     if choice is None or choice.stability < STABLE:
         return []
     best, *others = choice.close
-    others.sort(key=lambda one: -scores[one.model.effects[-1].name])
+    others.sort(key=lambda ahead: -scores[ahead.model.effects[-1].name])
     alone = ladder.unseen(last)
     tried: list[Member] = []
     for ahead in [best, *others][:_MEMBERS]:
         candidate = testable[ahead.model.effects[-1].name]
-        found = ladder.confirmed(last.fit, alone, candidate)
-        if _stands(candidate, found) and not found.absent:
-            tried.append((candidate, found, ahead))
+        confirmation = ladder.confirmed(last.fit, alone, candidate)
+        if _stands(candidate, confirmation) and not confirmation.absent:
+            tried.append((candidate, confirmation, ahead))
     steps = _put_on(ladder, shooting, steps, tried, choice.stability)
     idle = _idle(ladder, steps) if steps else None
     return steps if idle is None else ladder.without(idle, steps)
@@ -76,42 +76,42 @@ def _several_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) ->
     """Return the ladder with effects that make predictions better together, a step each; empty where none do."""
     first = steps[-1]
     assert first.ahead is not None
-    found = better_together(shooting, first.ahead, [c.effect for c in _testable(first).values()])
-    if found is None or len(steps) + len(found.effects) > ladder.settings.most_steps + 1:
+    joint = better_together(shooting, first.ahead, [c.effect for c in _testable(first).values()])
+    if joint is None or len(steps) + len(joint.effects) > ladder.settings.most_steps + 1:
         return []
-    for effect in found.effects[:-1]:
-        steps = _put_on(ladder, shooting, steps, _members(ladder, steps[-1], [effect]), found.stability)
+    for effect in joint.effects[:-1]:
+        steps = _put_on(ladder, shooting, steps, _members(ladder, steps[-1], [effect]), joint.stability)
         if not steps:
             return []
-    members = _members(ladder, steps[-1], found.alternatives[:_MEMBERS])
-    steps = _put_on(ladder, shooting, steps, members, found.stability)
+    members = _members(ladder, steps[-1], joint.alternatives[:_MEMBERS])
+    steps = _put_on(ladder, shooting, steps, members, joint.stability)
     if not steps:
         return []
-    several = steps[-len(found.effects) :]
+    several = steps[-len(joint.effects) :]
     names = tuple(step.added.name for step in several if step.added is not None)
     return [*steps[: -len(several)], *(replace(step, together=names) for step in several)]
 
 
 def _members(ladder: Ladder, last: Step, effects: Sequence[Effect]) -> list[Member]:
     """Refit a rung by likelihood and by legs with each of several effects; what comes to nothing is left out."""
-    found = []
+    members = []
     for effect in effects:
         candidate = _testable(last)[effect.name]
         confirmation, ahead = ladder.confirmed(last.fit, ladder.unseen(last), candidate), ladder.ahead(last, effect)
         if ahead is not None and _stands(candidate, confirmation):
-            found.append((candidate, confirmation, ahead))
-    return found
+            members.append((candidate, confirmation, ahead))
+    return members
 
 
-def _stands(candidate: Candidate, found: Confirmation) -> bool:
+def _stands(candidate: Candidate, confirmation: Confirmation) -> bool:
     """Return whether the likelihood has nothing against what legs chose.
 
     Disturbances carry a force one step ahead, so that the likelihood may be blind to it; a reading they do not carry,
     and an error of an instrument must hold by likelihood too.
     """
-    if candidate.effect.group == "sensor" and not found.holds:
+    if candidate.effect.group == "sensor" and not confirmation.holds:
         return False
-    return np.isfinite(found.fit.log_likelihood) and not found.at_bound
+    return np.isfinite(confirmation.fit.log_likelihood) and not confirmation.at_bound
 
 
 def _put_on(
@@ -136,22 +136,22 @@ def _decided(shooting: ShootingRange, tried: Sequence[Member]) -> list[Member]:
     """
     if not tried:
         return []
-    best = min(tried, key=lambda one: one[1].bic_change)[1]
+    best = min(tried, key=lambda member: member[1].bic_change)[1]
     close = [
-        one
-        for one in tried
-        if one[1].bic_change <= best.bic_change + WINDOW
-        or ahead_in_std(best.fit, one[1].fit, shooting.horizon_s) > -ALIKE
+        member
+        for member in tried
+        if member[1].bic_change <= best.bic_change + WINDOW
+        or ahead_in_std(best.fit, member[1].fit, shooting.horizon_s) > -ALIKE
     ]
-    first = min(close, key=lambda one: one[2].left_out.mean)
+    first = min(close, key=lambda member: member[2].left_out.mean)
     apart = shooting.beside(first[2], first[1].fit).disagrees is not None
     return sorted(
         tried if apart else close,
-        key=lambda one: (
-            len(one[0].effect.parameters),
-            apart and one[0].effect.polynomial,
-            one[2].left_out.mean,
-            one[0].effect.name,
+        key=lambda member: (
+            len(member[0].effect.parameters),
+            apart and member[0].effect.polynomial,
+            member[2].left_out.mean,
+            member[0].effect.name,
         ),
     )
 
@@ -163,7 +163,7 @@ def _idle(ladder: Ladder, steps: Sequence[Step]) -> Effect | None:
     assert now is not None
     for step in steps[1:-1]:
         assert step.added is not None
-        found = paired(ladder.shooting.without(now, step.added).left_out, now.left_out)
-        if found.in_std < ALIKE and found.falls_by < LEAST_FALL:
+        comparison = paired(ladder.shooting.without(now, step.added).left_out, now.left_out)
+        if comparison.in_std < ALIKE and comparison.falls_by < LEAST_FALL:
             return step.added
     return None

@@ -108,8 +108,8 @@ def diagnose(
     before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
     ladder = Ladder(shooting, effects, held, workers, settings, listener, base)
     steps = predicting_better(ladder, [first])
-    found = certain_ones(ladder, steps)
-    steps = found.steps
+    findings = certain_ones(ladder, steps)
+    steps = findings.steps
     listener.begins("measuring what is left")
     after = before
     if before is not None and ladder.probe is not base:
@@ -127,8 +127,8 @@ def diagnose(
         something_left=left,
         before=before,
         after=after,
-        immaterial=tuple(found.immaterial),
-        suspected=found.suspected,
+        immaterial=tuple(findings.immaterial),
+        suspected=findings.suspected,
         remaining=None if ahead is None else remaining_misfit(ahead, workers),
         fitted=tuple(filtered.run for filtered in base.runs),
         held=tuple(held),
@@ -150,8 +150,8 @@ def _begun(shooting: ShootingRange | None, base: PooledFit) -> Ahead | None:
     """Return the model that a diagnosis begins from one leg ahead."""
     if shooting is None:
         return None
-    made = shooting.plain
+    ahead = shooting.plain
     ship = base.ship
     if ship.model.effects:
-        made = shooting.refitted(ship.model, np.concatenate([made.fit.hull, ship.values]), made)
-    return shooting.beside(made, base)
+        ahead = shooting.refitted(ship.model, np.concatenate([ahead.fit.hull, ship.values]), ahead)
+    return shooting.beside(ahead, base)

@@ -25,7 +25,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     sets = [_set(diagnosis, f"S{number}", step) for number, step in enumerate(diagnosis.steps[1:], start=1)]
     first = len(diagnosis.steps)
     imitating = [_set(diagnosis, f"S{number}", step) for number, step in enumerate(diagnosis.imitating, start=first)]
-    member = {name: one["set_id"] for one in sets for name in one["effects"]}
+    member = {name: confusion_set["set_id"] for confusion_set in sets for name in confusion_set["effects"]}
     return {
         "verdict": verdict(diagnosis),
         "sentences": sentences(diagnosis),
@@ -34,14 +34,14 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "stand_ins": imitating,
         "immaterial": [
             {
-                "effects": [c.effect.name for c, _ in one.chosen_from],
-                "error_ahead_falls_by": one.weight.fall,
-                "in_std": one.weight.t,
-                "hull_changes_by": one.weight.shift,
-                "hull_changes_by_std": one.weight.shift_in_std,
-                "refits": [_refit(c, k) for c, k in one.chosen_from],
+                "effects": [c.effect.name for c, _ in immaterial.chosen_from],
+                "error_ahead_falls_by": immaterial.weight.fall,
+                "in_std": immaterial.weight.t,
+                "hull_changes_by": immaterial.weight.shift,
+                "hull_changes_by_std": immaterial.weight.shift_in_std,
+                "refits": [_refit(c, k) for c, k in immaterial.chosen_from],
             }
-            for one in diagnosis.immaterial
+            for immaterial in diagnosis.immaterial
         ],
         "suspected": [{"effect": name, "why": why} for name, why in diagnosis.suspected.items()],
         "share_explained": share_explained(diagnosis),

@@ -43,9 +43,9 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
         Of the plain model's screen.
     """
     effect = candidate.effect
-    found = _refitted(diagnosis, candidate.effect)
-    if found is not None:
-        return found
+    verdict = _refitted(diagnosis, candidate.effect)
+    if verdict is not None:
+        return verdict
     untestable = _untestable(candidate)
     if untestable:
         return EffectFinding("not_testable", untestable)
@@ -73,18 +73,18 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
         for member, confirmation in step.chosen_from:
             if member.effect.name == effect.name:
                 return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized_by_refit(effect, confirmation)}")
-    for one in diagnosis.immaterial:
-        for member, confirmation in one.chosen_from:
+    for immaterial in diagnosis.immaterial:
+        for member, confirmation in immaterial.chosen_from:
             if member.effect.name == effect.name:
-                return EffectFinding("immaterial", f"{sized_by_refit(effect, confirmation)}; {changes(one)}")
+                return EffectFinding("immaterial", f"{sized_by_refit(effect, confirmation)}; {changes(immaterial)}")
     return None
 
 
-def changes(one: Immaterial) -> str:
+def changes(immaterial: Immaterial) -> str:
     """Say how little an effect changes."""
     return (
-        f"with it the misfit one leg ahead changes by {-100.0 * one.weight.fall:+.1f} %, and no parameter of the hull "
-        f"moves by more than {100.0 * one.weight.shift:.1f} % beyond its error"
+        f"with it the misfit one leg ahead changes by {-100.0 * immaterial.weight.fall:+.1f} %, and no parameter of "
+        f"the hull moves by more than {100.0 * immaterial.weight.shift:.1f} % beyond its error"
     )
 
 
@@ -158,18 +158,18 @@ def _unusable_size(confirmation: Confirmation) -> str:
 
 def _too_weak(candidate: Candidate) -> str:
     """Say that even the largest physical size would not be seen; empty where it would."""
-    made = np.isfinite(candidate.std)
-    parameters = [p for p, m in zip(candidate.effect.parameters, made, strict=True) if m]
+    known = np.isfinite(candidate.std)
+    parameters = [p for p, m in zip(candidate.effect.parameters, known, strict=True) if m]
     reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
-    if np.all(reach < POWER * candidate.std[made]):
-        error = f"{candidate.std[made][0]:.2g} {parameters[0].unit}".rstrip()
+    if np.all(reach < POWER * candidate.std[known]):
+        error = f"{candidate.std[known][0]:.2g} {parameters[0].unit}".rstrip()
         return f"its standard error, {error}, is as large as any size that is physical."
     return ""
 
 
 def _absent(candidate: Candidate) -> str:
-    p, made = candidate.effect.parameters[0], np.isfinite(candidate.std)
-    if not made[0]:
+    p, known = candidate.effect.parameters[0], np.isfinite(candidate.std)
+    if not known[0]:
         return "not seen"
     limit = abs(candidate.change[0]) + 2.0 * candidate.std[0]
     return f"not seen; upper limit (95 %): |{p.name}| < {limit:.2g} {p.unit if p.unit != '1' else ''}".rstrip()

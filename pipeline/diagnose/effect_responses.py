@@ -57,8 +57,8 @@ def responses(
     result: list[Float | None] = [None] * len(trials)
     done = 0
     passed = workers.map(lambda bundle: _passed(base, [trials[i] for i in bundle]), bundles)
-    for bundle, made in zip(bundles, passed, strict=True):
-        for i, columns in zip(bundle, made, strict=True):
+    for bundle, answers in zip(bundles, passed, strict=True):
+        for i, columns in zip(bundle, answers, strict=True):
             result[i] = columns
         done += len(bundle)
         listener.counted(done, len(trials))
@@ -78,12 +78,12 @@ def _bundles(trials: Sequence[EffectTrial]) -> list[list[int]]:
     bundles: list[list[int]] = []
     lanes, last = 0, ""
     for i in sorted(range(len(trials)), key=lambda i: (_alone(trials[i].effect), i)):
-        own, wanted = _alone(trials[i].effect), len(trials[i].making)
-        if not bundles or own != last or lanes + wanted > MOST:
+        own, width = _alone(trials[i].effect), len(trials[i].making)
+        if not bundles or own != last or lanes + width > MOST:
             bundles.append([])
             lanes = 0
         bundles[-1].append(i)
-        lanes, last = lanes + wanted, own
+        lanes, last = lanes + width, own
     return bundles
 
 

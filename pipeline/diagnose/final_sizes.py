@@ -66,14 +66,14 @@ def final_sizes(steps: Sequence[Step], workers: Executor, listener: Listener = S
     for step in steps[1:]:
         (chosen, confirmation), *others = step.chosen_from
         sizes[chosen.effect.name] = _in(whole, chosen.effect)
-        for candidate, one in others:
+        for candidate, refit in others:
             if last is not confirmation.fit:
                 listener.begins(f"fitting {candidate.effect.title} in place of {chosen.effect.title}")
-                made = _in_place(last, chosen.effect, candidate.effect, one, workers, listener)
-                if made.converged:
-                    sizes[candidate.effect.name] = _in(with_instants(made, workers), candidate.effect)
+                fit = _in_place(last, chosen.effect, candidate.effect, refit, workers, listener)
+                if fit.converged:
+                    sizes[candidate.effect.name] = _in(with_instants(fit, workers), candidate.effect)
                     continue
-            sizes[candidate.effect.name] = refitted_size(candidate.effect, one)
+            sizes[candidate.effect.name] = refitted_size(candidate.effect, refit)
     return sizes
 
 
@@ -81,14 +81,14 @@ def _in_place(
     fit: PooledFit, effect: Effect, other: Effect, confirmation: Confirmation, workers: Executor, listener: Listener
 ) -> PooledFit:
     """Fit a model with another effect in the place of one of its own."""
-    model = EffectModel(tuple(other if one.name == effect.name else one for one in fit.model.effects))
+    model = EffectModel(tuple(other if member.name == effect.name else member for member in fit.model.effects))
     chosen = confirmation.fit
-    known = {one.name: fit.values[fit.model.own(one.name)] for one in fit.model.effects}
-    known[other.name] = chosen.values[chosen.model.own(other.name)]
-    values = np.concatenate([known[one.name] for one in model.effects])
+    sizes = {member.name: fit.values[fit.model.own(member.name)] for member in fit.model.effects}
+    sizes[other.name] = chosen.values[chosen.model.own(other.name)]
+    values = np.concatenate([sizes[member.name] for member in model.effects])
     return refitted(fit.runs, model, chosen.hull, fit.levels, values, workers, listener=listener)
 
 
-def _in(known: WithInstants, effect: Effect) -> Size:
-    at = known.fit.model.own(effect.name)
-    return Size(known.fit.values[at], known.std(known.fit.values.size)[at], agreement_of(known.fit).widened)
+def _in(stated: WithInstants, effect: Effect) -> Size:
+    at = stated.fit.model.own(effect.name)
+    return Size(stated.fit.values[at], stated.std(stated.fit.values.size)[at], agreement_of(stated.fit).widened)

@@ -68,5 +68,5 @@ def weighed(before: Ahead | None, after: Ahead | None, plain: PooledFit, fitted:
     shift = (float(np.max(part, initial=0.0)), float(np.max(in_std, initial=0.0)))
     if before is None or after is None:
         return Weight(np.nan, np.nan, *shift)
-    found = paired(before.left_out, after.left_out)
-    return Weight(found.falls_by, found.in_std, *shift)
+    comparison = paired(before.left_out, after.left_out)
+    return Weight(comparison.falls_by, comparison.in_std, *shift)

@@ -44,11 +44,11 @@ def with_instrument_noise(fit: PooledFit, workers: Executor, listener: Listener 
         Notified of every iteration.
     """
     some = _some_of(fit)
-    found = _one_by_one(some, workers, listener)
-    if found is some:
+    noisy = _one_by_one(some, workers, listener)
+    if noisy is some:
         return fit
-    found = with_joint_noise(found, _LEAST_GAIN, workers, listener)
-    return found if some is fit else _of_all(fit, some, found, workers, listener)
+    noisy = with_joint_noise(noisy, _LEAST_GAIN, workers, listener)
+    return noisy if some is fit else _of_all(fit, some, noisy, workers, listener)
 
 
 def _some_of(fit: PooledFit) -> PooledFit:
@@ -71,11 +71,11 @@ def _some_of(fit: PooledFit) -> PooledFit:
     )
 
 
-def _of_all(fit: PooledFit, some: PooledFit, found: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
+def _of_all(fit: PooledFit, some: PooledFit, noisy: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
     """Fit all runs with the lasting noise that some of them show."""
-    levels = fit.levels + np.mean(found.levels - some.levels, axis=0)
-    made = refitted(fit.runs, found.model, found.hull, levels, found.values, workers, listener=listener)
-    return made if made.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
+    levels = fit.levels + np.mean(noisy.levels - some.levels, axis=0)
+    refit = refitted(fit.runs, noisy.model, noisy.hull, levels, noisy.values, workers, listener=listener)
+    return refit if refit.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
 
 
 def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
@@ -83,12 +83,14 @@ def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> Pooled
     while True:
         there = {effect.name for effect in fit.model.effects}
         left = {name: noise for name, noise in lasting_noise().items() if name not in there}
-        best = max(screen(fit, left, workers, listener), key=lambda one: np.nan_to_num(one.score), default=None)
+        best = max(
+            screen(fit, left, workers, listener), key=lambda candidate: np.nan_to_num(candidate.score), default=None
+        )
         if best is None or not best.score > _LEAST_SCORE:
             return fit
-        if any(one.score > best.score for one in screen(fit, effects, workers, listener)):
+        if any(candidate.score > best.score for candidate in screen(fit, effects, workers, listener)):
             return fit
-        made = added(fit, best, workers, listener=listener)
-        if not made.log_likelihood > fit.log_likelihood + _LEAST_GAIN:
+        refit = added(fit, best, workers, listener=listener)
+        if not refit.log_likelihood > fit.log_likelihood + _LEAST_GAIN:
             return fit
-        fit = made
+        fit = refit

@@ -55,25 +55,25 @@ def better_together(shooting: ShootingRange, base: Ahead, effects: Sequence[Effe
     """
     if len(base.held.errors) < _FEWEST_HELD:
         return None
-    known = [effect for effect in effects if _is_linear(effect) and effect.name not in base.names]
-    linear = shooting.linearised(base, known)
+    candidates = [effect for effect in effects if _is_linear(effect) and effect.name not in base.names]
+    linear = shooting.linearised(base, candidates)
     if linear is None:
         return None
     good = []
-    for chosen, shared in _worth(linear, base, known):
-        made = shooting.with_effects(base, chosen, shared)
-        if np.all(np.isfinite(made.left_out.misfits)) and not at_bounds(made, len(chosen)):
-            good.append(made)
+    for chosen, shared in _worth(linear, base, candidates):
+        refit = shooting.with_effects(base, chosen, shared)
+        if np.all(np.isfinite(refit.left_out.misfits)) and not at_bounds(refit, len(chosen)):
+            good.append(refit)
     if not good:
         return None
     best = _best(good)
-    close = [one for one in good if paired(best.left_out, one.left_out).in_std > -ALIKE]
-    alike = [one for one in good if kinds(one.model.effects) == kinds(best.model.effects)]
+    close = [ahead for ahead in good if paired(best.left_out, ahead.left_out).in_std > -ALIKE]
+    alike = [ahead for ahead in good if kinds(ahead.model.effects) == kinds(best.model.effects)]
     stability = stability_of(good, alike)
     added = best.model.effects[len(base.model.effects) :]
     if not (stability >= STABLE and _holds(base, best) and all(_is_needed(shooting, best, e) for e in added)):
         return None
-    return _ordered(base, added, [one for one in close if _holds(base, one)], stability)
+    return _ordered(base, added, [ahead for ahead in close if _holds(base, ahead)], stability)
 
 
 def _best(good: Sequence[Ahead]) -> Ahead:
@@ -82,9 +82,9 @@ def _best(good: Sequence[Ahead]) -> Ahead:
     The mean misfit hangs on the few windows that are predicted worst. Between sets whose means differ by less than
     anybody would notice, the errors window by window decide.
     """
-    least = min(good, key=lambda one: one.left_out.mean)
-    beside = [(one, paired(least.left_out, one.left_out)) for one in good]
-    near = [(found.in_std, one) for one, found in beside if found.falls_by > -LEAST_FALL]
+    least = min(good, key=lambda ahead: ahead.left_out.mean)
+    beside = [(ahead, paired(least.left_out, ahead.left_out)) for ahead in good]
+    near = [(comparison.in_std, ahead) for ahead, comparison in beside if comparison.falls_by > -LEAST_FALL]
     return max(near, key=lambda pair: pair[0])[1]
 
 
@@ -101,7 +101,7 @@ def _worth(linear: NormalEquations, base: Ahead, effects: Sequence[Effect]) -> l
     place = {e.name: np.arange(end - n, end) for e, end, n in zip(effects, ends, counts, strict=True)}
     common = np.arange(first)
     costs: dict[frozenset[str], float] = {}
-    found = []
+    sets = []
     for chosen in _sets(effects):
         part = linear.of(np.concatenate([common, *(place[effect.name] for effect in chosen)]))
         step = part.step(_DAMPING)
@@ -110,9 +110,9 @@ def _worth(linear: NormalEquations, base: Ahead, effects: Sequence[Effect]) -> l
         least = min((costs[names - {name}] for name in names), default=linear.cost) if len(names) > 1 else linear.cost
         # each of them must be worth its while
         if len(chosen) > 1 and least - costs[names] > LEAST_FALL * linear.cost:
-            found.append((costs[names], chosen, part.at + step))
-    found.sort(key=lambda one: (one[0], [effect.name for effect in one[1]]))
-    return [(chosen, shared) for _, chosen, shared in found[:_REFITS]]
+            sets.append((costs[names], chosen, part.at + step))
+    sets.sort(key=lambda entry: (entry[0], [effect.name for effect in entry[1]]))
+    return [(chosen, shared) for _, chosen, shared in sets[:_REFITS]]
 
 
 def _sets(effects: Sequence[Effect]) -> Iterator[tuple[Effect, ...]]:
@@ -123,11 +123,11 @@ def _sets(effects: Sequence[Effect]) -> Iterator[tuple[Effect, ...]]:
                 yield chosen
 
 
-def _holds(base: Ahead, made: Ahead) -> bool:
+def _holds(base: Ahead, ahead: Ahead) -> bool:
     """Return whether the error falls clearly in manoeuvres left out and held out, and by as much as its effects owe."""
-    owed = LEAST_FALL * (len(made.model.effects) - len(base.model.effects))
-    falls = (paired(base.left_out, made.left_out), paired(base.held, made.held))
-    return not worsens(base, made) and all(
+    owed = LEAST_FALL * (len(ahead.model.effects) - len(base.model.effects))
+    falls = (paired(base.left_out, ahead.left_out), paired(base.held, ahead.held))
+    return not worsens(base, ahead) and all(
         fall.in_std > _FALLS and fall.falls_by > owed and fall.better >= MOST * fall.of for fall in falls
     )
 
@@ -150,8 +150,8 @@ def _ordered(base: Ahead, added: Sequence[Effect], close: Sequence[Ahead], stabi
     """Put that effect last which most others could replace."""
     names = {effect.name for effect in added}
     instead: dict[str, list[Effect]] = {effect.name: [] for effect in added}
-    for one in close:
-        others = one.model.effects[len(base.model.effects) :]
+    for ahead in close:
+        others = ahead.model.effects[len(base.model.effects) :]
         gone = names - {effect.name for effect in others}
         if len(gone) == 1 and len(others) == len(added):
             instead[gone.pop()] += [effect for effect in others if effect.name not in names]

@@ -53,36 +53,34 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     values = np.concatenate([fit.values, *(_typical(noise) for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
-    made, settled = _climbed(made, wanted, workers, listener)
+    joint = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
+    joint, settled = _climbed(joint, wanted, workers, listener)
 
     def usable(log_likelihood: float, there: bool) -> bool:
         # a fit that did not converge itself may ask no more of another
         return log_likelihood > wanted and (there or not fit.converged)
 
-    first = usable(made.log_likelihood, settled)
+    first = usable(joint.log_likelihood, settled)
     every = lasting_noise()
     begin = [_typical(e) if e.name in every else fit.values[fit.model.own(e.name)] for e in model.effects]
-    higher = made.log_likelihood + _LEFT if first else wanted
+    higher = joint.log_likelihood + _LEFT if first else wanted
     # to its end: whether a climb can come so high is judged too early where it begins with a long way to go
     other = refitted(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers, listener=listener)
     other, other_settled = _climbed(other, higher, workers, listener)
     second = other.log_likelihood > higher and usable(other.log_likelihood, other_settled)
     if second and (other_settled or not (first and settled)):
-        made = other
+        joint = other
     elif not first:
         return fit
-    return _without_idle(made, missing, least_gain, workers, listener)
+    return _without_idle(joint, missing, least_gain, workers, listener)
 
 
-def _climbed(made: PooledFit, wanted: float, workers: Executor, listener: Listener) -> tuple[PooledFit, bool]:
+def _climbed(fit: PooledFit, wanted: float, workers: Executor, listener: Listener) -> tuple[PooledFit, bool]:
     """Climb on where the iterations ran out next to the top; return the fit and whether it has reached the top."""
-    if made.converged or not made.log_likelihood > wanted:
-        return made, made.converged
-    more = refitted(
-        *(made.runs, made.model, made.hull, made.levels, made.values, workers), wanted=wanted, listener=listener
-    )
-    return more, more.converged or more.log_likelihood < made.log_likelihood + _LEFT
+    if fit.converged or not fit.log_likelihood > wanted:
+        return fit, fit.converged
+    more = refitted(*(fit.runs, fit.model, fit.hull, fit.levels, fit.values, workers), wanted=wanted, listener=listener)
+    return more, more.converged or more.log_likelihood < fit.log_likelihood + _LEFT
 
 
 def _typical(noise: Effect) -> list[float]:

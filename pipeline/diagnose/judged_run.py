@@ -62,12 +62,12 @@ def judged_held_out(
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
     """
-    fit, made = step.fit, []
+    fit, judged = step.fit, []
     usual = np.mean(fit.levels, axis=0)
     for run, free in zip(held, step.held, strict=True):
         filtered = RunFilter(run, fit.model, fit.runs[0].spec)
         levels = fit_levels(filtered, fit.hull, fit.values, usual).levels
         point = Point(fit.hull, fit.values, levels)
         passed = sensitivity.passed(filtered, point)
-        made.append(JudgedRun(point, Looked(filtered, passed, free, tuple(phases.get(run.name, ())))))
-    return tuple(made)
+        judged.append(JudgedRun(point, Looked(filtered, passed, free, tuple(phases.get(run.name, ())))))
+    return tuple(judged)

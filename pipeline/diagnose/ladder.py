@@ -48,12 +48,12 @@ class Ladder:
         self.listener.begins(f"refitting with {candidate.effect.title}")
         name = candidate.effect.name
         race = name not in self.in_vain
-        made = confirm(base, alone, candidate, self.held, self.workers, most_bic, self.listener, race=race)
-        if made.likelihood_ratio <= 0.0:
+        confirmation = confirm(base, alone, candidate, self.held, self.workers, most_bic, self.listener, race=race)
+        if confirmation.likelihood_ratio <= 0.0:
             self.in_vain.add(name)
-        if not made.outdone:
-            self.refits[base, name] = made
-        return made
+        if not confirmation.outdone:
+            self.refits[base, name] = confirmation
+        return confirmation
 
     def unseen(self, step: Step) -> Unseen:
         """Return how a rung predicts what it did not see; its confirmation has asked that already."""
@@ -81,21 +81,21 @@ class Ladder:
         screened = screen(fit, self.effects, self.workers, self.listener)
         if self.shooting is not None and ahead is not None:
             ahead = self.shooting.beside(ahead, fit)
-        made = make_step(fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
-        return replace(made, stability=stability)
+        step = make_step(fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
+        return replace(step, stability=stability)
 
     def without(self, idle: Effect, steps: Sequence[Step]) -> list[Step]:
         """Climb the ladder again without an effect; what was refused on the way stays listed."""
         self.listener.begins(f"{idle.title} is no longer needed")
-        made = [steps[0]]
+        rungs = [steps[0]]
         refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
         for step in steps[1:]:
             if step.added is None or step.added.name == idle.name:
                 continue
-            candidate = score(made[-1].fit, step.added, self.workers)
-            confirmation = self.confirmed(made[-1].fit, self.unseen(made[-1]), candidate)
+            candidate = score(rungs[-1].fit, step.added, self.workers)
+            confirmation = self.confirmed(rungs[-1].fit, self.unseen(rungs[-1]), candidate)
             others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
-            ahead = self.ahead(made[-1], step.added)
+            ahead = self.ahead(rungs[-1], step.added)
             again = self.stepped(((candidate, confirmation),), others, ahead, step.stability)
-            made.append(replace(again, together=tuple(name for name in step.together if name != idle.name)))
-        return made
+            rungs.append(replace(again, together=tuple(name for name in step.together if name != idle.name)))
+        return rungs

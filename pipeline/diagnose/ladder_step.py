@@ -175,7 +175,9 @@ def _ahead(ahead: Ahead, before: Ahead | None) -> dict[str, Any]:
             for name, value, std in zip((*_HULL, *ahead.model.names), ahead.fit.shared, std, strict=True)
         },
         "covariance": covariance.tolist(),
-        "beside_the_rung_below": {sample: asdict(one) for sample, one in zip(samples, against, strict=False)},
+        "beside_the_rung_below": {
+            sample: asdict(comparison) for sample, comparison in zip(samples, against, strict=False)
+        },
         "one_step_parameters_misfit": None if ahead.one_step is None else ahead.one_step.mean,
         "better_than_one_step": None if ahead.disagrees is None else asdict(ahead.disagrees),
     }

@@ -71,8 +71,8 @@ def ahead_in_std(first: PooledFit, second: PooledFit, leg_s: float) -> float:
 
 
 def _log_likelihood(innovation: Float, variance: Float) -> Float:
-    made = np.isfinite(innovation)
-    result: Float = -0.5 * (np.log(variance[made]) + innovation[made] ** 2 / variance[made])
+    measured = np.isfinite(innovation)
+    result: Float = -0.5 * (np.log(variance[measured]) + innovation[measured] ** 2 / variance[measured])
     return result
 
 
@@ -80,8 +80,8 @@ def _stretch(innovation: Float, step_s: float, leg_s: float) -> Rows:
     """Return the stretch that every measurement belongs to, in the order in which measurements are listed."""
     rows, _ = np.nonzero(np.isfinite(innovation))
     many = max(2, round(innovation.shape[0] * step_s / leg_s))
-    found: Rows = np.minimum(rows * many // innovation.shape[0], many - 1)
-    return found
+    stretches: Rows = np.minimum(rows * many // innovation.shape[0], many - 1)
+    return stretches
 
 
 def _summed(values: Float, of: Rows) -> Float:

@@ -74,7 +74,7 @@ def manoeuvre_evidence(
         float(run.time_s[-1]),
     )
     course = _BaseCourse.of(run, executes[0] if executes else _APPROACH_S, zigzag.base_heading_deg)
-    known = states[:, :2] if np.all(np.isfinite(states)) else run.measured[:, :2]
+    motion = states[:, :2] if np.all(np.isfinite(states)) else run.measured[:, :2]
     return ManoeuvreEvidence(
         segment_id=run.name,
         start_utc_ns=run.start_utc_ns,
@@ -83,8 +83,8 @@ def manoeuvre_evidence(
         rudder=run.rudder_rad,
         speed=run.speed_m_s,
         measured=run.measured,
-        drift=known[:, 0],
-        turn=known[:, 1],
+        drift=motion[:, 0],
+        turn=motion[:, 1],
         heading_deviation=course.deviation(course.heading),
         phases=tuple(
             ManoeuvrePhase(name=phase.name, start_s=phase.start_s, end_s=phase.end_s)
@@ -125,14 +125,14 @@ class _BaseCourse:
 def _predicted(judged: JudgedRun, turns: tuple[Turn, ...], course: _BaseCourse) -> PredictedManoeuvre:
     run, free = judged.residuals.filtered.run, judged.residuals.free
     heading, whitened = free.predicted[:, 2], judged.residuals.whitened
-    made = whitened[np.isfinite(whitened)]
+    values = whitened[np.isfinite(whitened)]
     pairs = compare_overshoots(run.time_s, run.measured[:, 2], heading, turns) if np.all(np.isfinite(heading)) else ()
     return PredictedManoeuvre(
         free_run=free.predicted,
         free_run_error=free.error,
         heading_deviation=course.deviation(heading),
         whitened=whitened,
-        whitened_rms=float(np.sqrt(np.mean(made**2))) if made.size else None,
+        whitened_rms=float(np.sqrt(np.mean(values**2))) if values.size else None,
         fit_percent=_fits(judged),
         overshoots=tuple(
             OvershootPair(
@@ -149,10 +149,10 @@ def _fits(judged: JudgedRun) -> dict[str, dict[str, float]]:
         horizon, filtered = horizon_of(name), judged.residuals.filtered
         try:
             if name == "free":
-                made = of_free_run(filtered, judged.residuals.free, horizon)
+                prediction = of_free_run(filtered, judged.residuals.free, horizon)
             else:
-                made = predict(filtered, judged.point, horizon)
+                prediction = predict(filtered, judged.point, horizon)
         except DataRejected:
             continue
-        fits[horizon.words] = made.fit_percent()
+        fits[horizon.words] = prediction.fit_percent()
     return fits

@@ -45,24 +45,26 @@ class Choice:
 
 def falls(before: Ahead, after: Ahead) -> bool:
     """Return whether a model predicts manoeuvres left out clearly better than another, and no others worse."""
-    found = paired(before.left_out, after.left_out)
+    comparison = paired(before.left_out, after.left_out)
     return bool(
-        found.in_std > FALLS
-        and found.falls_by > LEAST_FALL
-        and found.better >= MOST * found.of
+        comparison.in_std > FALLS
+        and comparison.falls_by > LEAST_FALL
+        and comparison.better >= MOST * comparison.of
         and not worsens(before, after)
     )
 
 
 def worsens(before: Ahead, after: Ahead) -> bool:
     """Return whether a model predicts fitted, left-out or held-out manoeuvres worse than another, beyond the error."""
-    return any(one.in_std < -WORSE and one.falls_by < -LEAST_RISE for one in comparisons(before, after))
+    return any(
+        comparison.in_std < -WORSE and comparison.falls_by < -LEAST_RISE for comparison in comparisons(before, after)
+    )
 
 
 def comparisons(before: Ahead, after: Ahead) -> list[Paired]:
     """Compare two models on fitted, left-out and, where there are any, held-out manoeuvres."""
-    found = [paired(before.own, after.own), paired(before.left_out, after.left_out)]
-    return [*found, paired(before.held, after.held)] if before.held.errors else found
+    pairs = [paired(before.own, after.own), paired(before.left_out, after.left_out)]
+    return [*pairs, paired(before.held, after.held)] if before.held.errors else pairs
 
 
 def better_ahead(
@@ -85,15 +87,15 @@ def better_ahead(
         likeliest = max(worth, key=lambda effect: scores[effect.name])
         short += [likeliest] if likeliest not in short else []
     refitted = (shooting.with_effect(base, effect) for effect in short)
-    tried = [made for made in refitted if made is not None]
-    good = [one for one in tried if not (at_bounds(one) or worsens(base, one))]
+    tried = [refit for refit in refitted if refit is not None]
+    good = [ahead for ahead in tried if not (at_bounds(ahead) or worsens(base, ahead))]
     if not good:
         return None
-    best = min(good, key=lambda one: one.left_out.mean)
+    best = min(good, key=lambda ahead: ahead.left_out.mean)
     if not falls(base, best):
         return None
-    close = [one for one in good if one is best or _alike(base, best, one)]
-    close.sort(key=lambda one: one.left_out.mean)
+    close = [ahead for ahead in good if ahead is best or _alike(base, best, ahead)]
+    close.sort(key=lambda ahead: ahead.left_out.mean)
     return Choice(tuple(close), stability_of(good, close))
 
 
@@ -107,7 +109,7 @@ def _alike(base: Ahead, best: Ahead, other: Ahead) -> bool:
 
 def stability_of(good: Sequence[Ahead], close: Sequence[Ahead]) -> float:
     """Return the share of repetitions without one manoeuvre each in which the best is one of ``close``."""
-    misfits = np.array([one.left_out.misfits for one in good])
+    misfits = np.array([ahead.left_out.misfits for ahead in good])
     rest = misfits.sum(axis=1, keepdims=True) - misfits
     chosen = np.argmin(rest, axis=0)
-    return float(np.mean([any(good[k] is one for one in close) for k in chosen]))
+    return float(np.mean([any(good[k] is ahead for ahead in close) for k in chosen]))

@@ -28,47 +28,49 @@ class RemainingMisfit:
 def remaining_misfit(ahead: Ahead, workers: Executor) -> RemainingMisfit | None:
     """Return what a model leaves; None where it runs away."""
     windows = [*(shot.windows for shot in ahead.fit.shots), *ahead.held_windows]
-    found = places(windows, [*ahead.left_out.errors, *ahead.held.errors])
-    if found is None:
+    by_place = places(windows, [*ahead.left_out.errors, *ahead.held.errors])
+    if by_place is None:
         return None
-    return RemainingMisfit(repeats(ahead.fit, ahead.held_windows, ahead.horizon_s, workers), found)
+    return RemainingMisfit(repeats(ahead.fit, ahead.held_windows, ahead.horizon_s, workers), by_place)
 
 
-def said(remaining: RemainingMisfit, what: str) -> list[str]:
+def said(remaining: RemainingMisfit, misfit: str) -> list[str]:
     """Return in a sentence each how much of the misfit is noise, and where it sits.
 
     Parameters
     ----------
-    what : str
+    misfit : str
         The misfit that is meant.
     """
-    return [_noise(remaining.repeats, what), _sits(remaining.places, what)]
+    return [_noise(remaining.repeats, misfit), _sits(remaining.places, misfit)]
 
 
-def _noise(found: Repeats, what: str) -> str:
-    if found.share is None or found.std is None:
+def _noise(noise: Repeats, misfit: str) -> str:
+    if noise.share is None or noise.std is None:
         few = "no two legs repeat"
-        if found.pairs:
+        if noise.pairs:
             few = (
-                f"only {found.pairs} pair{' of legs nearly repeats' if found.pairs == 1 else 's of legs nearly repeat'}"
+                f"only {noise.pairs} pair{' of legs nearly repeats' if noise.pairs == 1 else 's of legs nearly repeat'}"
             )
-        return f"How much of {what} is noise of the experiment is not known: {few} each other in different manoeuvres."
-    share = min(max(found.share, 0.0), 1.0)
+        return (
+            f"How much of {misfit} is noise of the experiment is not known: {few} each other in different manoeuvres."
+        )
+    share = min(max(noise.share, 0.0), 1.0)
     return (
-        f"Of {what}, {100.0 * share:.0f} ± {100.0 * found.std:.0f} % (1 s.e.) is noise of the experiment, by "
-        f"{found.pairs} pairs of legs in {found.manoeuvres} manoeuvres that nearly repeat each other."
+        f"Of {misfit}, {100.0 * share:.0f} ± {100.0 * noise.std:.0f} % (1 s.e.) is noise of the experiment, by "
+        f"{noise.pairs} pairs of legs in {noise.manoeuvres} manoeuvres that nearly repeat each other."
     )
 
 
-def _sits(found: Places, what: str) -> str:
-    channel = int(np.nanargmax(found.channels))
-    name, share = _CHANNELS[channel].replace("_", " "), 100.0 * found.channels[channel]
-    said = f"{what[:1].upper()}{what[1:]} is largest in {name} ({share:.0f} % of it)"
-    regime, manoeuvre = found.most("leg", *_OF), found.most("manoeuvre")
+def _sits(by_place: Places, misfit: str) -> str:
+    channel = int(np.nanargmax(by_place.channels))
+    name, share = _CHANNELS[channel].replace("_", " "), 100.0 * by_place.channels[channel]
+    sentence = f"{misfit[:1].upper()}{misfit[1:]} is largest in {name} ({share:.0f} % of it)"
+    regime, manoeuvre = by_place.most("leg", *_OF), by_place.most("manoeuvre")
     named = [_held(place) for place in (regime, manoeuvre) if place is not None]
     if not named:
-        return f"{said}; no manoeuvre, leg, rudder angle, yaw rate or drift stands out."
-    return f"{said}; {' and '.join(named)}."
+        return f"{sentence}; no manoeuvre, leg, rudder angle, yaw rate or drift stands out."
+    return f"{sentence}; {' and '.join(named)}."
 
 
 def _held(place: Place) -> str:
@@ -85,15 +87,15 @@ def _held(place: Place) -> str:
 
 def as_json(remaining: RemainingMisfit) -> dict[str, Any]:
     """Return it as JSON content."""
-    found = remaining.repeats
+    noise = remaining.repeats
     return {
-        "noise_share": found.share,
-        "noise_share_std": found.std,
-        "pairs": found.pairs,
-        "manoeuvres": found.manoeuvres,
+        "noise_share": noise.share,
+        "noise_share_std": noise.std,
+        "pairs": noise.pairs,
+        "manoeuvres": noise.manoeuvres,
         "channels": dict(zip(_CHANNELS, remaining.places.channels, strict=True)),
         "places": [
-            {"by": one.by, "name": one.name, "share": one.share, "of_windows": one.of_windows}
-            for one in remaining.places.places
+            {"by": place.by, "name": place.name, "share": place.share, "of_windows": place.of_windows}
+            for place in remaining.places.places
         ],
     }

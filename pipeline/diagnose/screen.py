@@ -133,16 +133,16 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     unknown = np.full(len(effect.parameters), np.nan)
     if absorption > NOT_TESTABLE or before == 0.0 or np.any(np.sum(clean**2, axis=0) == 0.0):
         return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, absorption, (), np.zeros(0), steps)
-    found = solved(clean, known.u, effect, steps)
+    solution = solved(clean, known.u, effect, steps)
     return Candidate(
         effect=effect,
-        score=found.score,
-        p_value=chi2_tail(found.score, found.estimate.size) if plausible(effect, found.change) else 1.0,
+        score=solution.score,
+        p_value=chi2_tail(solution.score, solution.estimate.size) if plausible(effect, solution.change) else 1.0,
         p_adjusted=1.0,
-        change=found.change,
-        std=found.std,
+        change=solution.change,
+        std=solution.std,
         absorption=absorption,
         missing=(),
-        direction=clean @ found.estimate,
+        direction=clean @ solution.estimate,
         steps=steps,
     )

@@ -26,50 +26,50 @@ _UNSTABLE = (
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
     """Return what a person should read first, a sentence each."""
-    said = []
-    what = verdict(diagnosis)
+    lines = []
+    outcome = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
         (candidate, _), *others = step.chosen_from
         line = f"{candidate.effect.plain.rstrip('.')}: {stated(diagnosis, step, candidate.effect)}"
         if others:
             line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
-        said.append(line.rstrip(".") + ".")
-    said += _together(diagnosis)
+        lines.append(line.rstrip(".") + ".")
+    lines += _together(diagnosis)
     if len(diagnosis.steps) > 1:
-        said += _ahead(diagnosis)
-        said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+        lines += _ahead(diagnosis)
+        lines.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
         size = sized_by_refit(candidate.effect, best)
-        said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
-    for one in diagnosis.immaterial:
-        (candidate, best), *_ = one.chosen_from
-        said.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(one)}.")
-    if what == "insufficient_data":
-        said.append(
+        lines.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
+    for immaterial in diagnosis.immaterial:
+        (candidate, best), *_ = immaterial.chosen_from
+        lines.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(immaterial)}.")
+    if outcome == "insufficient_data":
+        lines.append(
             "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "
             "at two rudder angles, on two headings."
         )
-    if what == "adequate":
-        said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
+    if outcome == "adequate":
+        lines.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
     if diagnosis.something_left and diagnosis.after is not None:
-        if what == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
-            said.append(
+        if outcome == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
+            lines.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
                 f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
             )
         else:
-            said.append(
+            lines.append(
                 f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and "
                 "the first explains too little to be the cause."
             )
         if diagnosis.after.formula:
             terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
-            said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
-    if len(diagnosis.steps) == 1 and what != "insufficient_data":
-        said += _left(diagnosis)
-    return said
+            lines.append(f"Exploratory, not a finding; a formula to try: {terms}.")
+    if len(diagnosis.steps) == 1 and outcome != "insufficient_data":
+        lines += _left(diagnosis)
+    return lines
 
 
 def _left(diagnosis: Diagnosis) -> list[str]:
@@ -87,9 +87,9 @@ def _together(diagnosis: Diagnosis) -> list[str]:
     sets = dict.fromkeys(step.together for step in diagnosis.steps if step.together)
     words = [listed([titles[name] for name in names]) for names in sets]
     return [
-        f"{said[:1].upper()}{said[1:]} belong together: each of them alone makes no prediction clearly better. They "
-        "were chosen by manoeuvres left out, and the held-out ones, which had no part in the choice, confirm them."
-        for said in words
+        f"{phrase[:1].upper()}{phrase[1:]} belong together: each of them alone makes no prediction clearly better. "
+        "They were chosen by manoeuvres left out, and the held-out ones, which had no part in the choice, confirm them."
+        for phrase in words
     ]
 
 
@@ -106,24 +106,24 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     ]
     before, after = first.percent(first.left_out), last.percent(last.left_out)
     best, worst = int(np.argmin(after - before)), int(np.argmax(after - before))
-    said = [
+    lines = [
         f"One leg ahead ({last.horizon_s:.3g} s) the error, of the motion, goes {listed(falls)}; left out, it goes "
         f"from {before[best]:.1f} to {after[best]:.1f} % in the manoeuvre that gains most, from {before[worst]:.1f} to "
         f"{after[worst]:.1f} % in the one that gains least."
     ]
     share = share_explained(diagnosis)
     if share is not None:
-        said.append(
+        lines.append(
             f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained."
         )
-    said += _left(diagnosis)
+    lines += _left(diagnosis)
     if last.disagrees is not None:
-        said.append(
+        lines.append(
             f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
             f"{100.0 * last.disagrees.falls_by:.0f} % smaller, so that something is still lacking; predictions of "
             "manoeuvres take those."
         )
-    return said
+    return lines
 
 
 def _fall(first: Step, last: Step) -> str:
@@ -136,18 +136,18 @@ def _fall(first: Step, last: Step) -> str:
     if a is None or b is None:
         return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
     held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
-    said = (
+    sentence = (
         f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
         f"{fitted}, {disturbance}"
     )
     if not _keeps_course(last.fit.hull):
-        said += _UNSTABLE
+        sentence += _UNSTABLE
     elif b > a:
-        said += (
+        sentence += (
             " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
             "and the disturbance."
         )
-    return said
+    return sentence
 
 
 def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
@@ -160,11 +160,13 @@ def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
         if last.by_legs[part]
     ]
     off = sum(not run.relative_error < 1.0 for run in last.by_legs)
-    said = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
+    sentence = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
     assert last.ahead is not None
     if not _keeps_course(last.ahead.fit.hull):
-        said += _UNSTABLE
-    return f"{said} {off} of {len(last.by_legs)} free runs leave the measured course altogether." if off else said
+        sentence += _UNSTABLE
+    return (
+        f"{sentence} {off} of {len(last.by_legs)} free runs leave the measured course altogether." if off else sentence
+    )
 
 
 def _median(runs: Sequence[FreeRun]) -> str:

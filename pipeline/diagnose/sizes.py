@@ -49,5 +49,5 @@ def _shown(name: str, value: float, std: float, unit: str) -> str:
     digits = max(0, 1 - int(np.floor(np.log10(abs(std * factor))))) if np.isfinite(std) and std > 0.0 else 4
     digits = min(digits, 8)
     error = f" ± {std * factor:.{digits}f}" if np.isfinite(std) else ""
-    what = " (1 s.e.)" if error else ""
-    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}{what}"
+    note = " (1 s.e.)" if error else ""
+    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}{note}"

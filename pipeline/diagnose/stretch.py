@@ -117,7 +117,7 @@ def explain(
     errors = rows.left(rows.all_rows(base))
     about_mean = errors[: errors.size // 2]
     square, count = float(about_mean @ about_mean), about_mean.size
-    whole = sum(int(np.isfinite(one.run.measured).any(axis=1).sum()) for one in base.runs)
+    whole = sum(int(np.isfinite(filtered.run.measured).any(axis=1).sum()) for filtered in base.runs)
     nothing = Explained(
         instants=rows.instants,
         measurements=count,
@@ -130,7 +130,7 @@ def explain(
         return nothing
     present = {effect.name for effect in base.model.effects}
     untested = [_untested(base, effect) for effect in effects.values() if effect.name not in present]
-    tried = [one.effect for one in untested if not (one.missing or one.measured_by)]
+    tried = [candidate.effect for candidate in untested if not (candidate.missing or candidate.measured_by)]
     trials = [EffectTrial(effect, steps) for effect in tried for steps in grid(effect)]
     moved: dict[str, list[tuple[EffectTrial, Float]]] = {}
     for trial, columns in zip(trials, responses(base, trials, workers), strict=True):
@@ -138,12 +138,12 @@ def explain(
             moved.setdefault(trial.effect.name, []).append((trial, columns))
     free = rows.whitened(errors)
 
-    def tested(one: StretchEffect) -> StretchEffect:
-        every = moved.get(one.effect.name, [])
-        return _best(one, [_tested(rows, errors, free, trial, columns) for trial, columns in every])
+    def tested(candidate: StretchEffect) -> StretchEffect:
+        every = moved.get(candidate.effect.name, [])
+        return _best(candidate, [_tested(rows, errors, free, trial, columns) for trial, columns in every])
 
-    found = list(workers.map(tested, untested))
-    return replace(nothing, effects=_ranked(found))
+    candidates = list(workers.map(tested, untested))
+    return replace(nothing, effects=_ranked(candidates))
 
 
 def _untested(base: PooledFit, effect: Effect) -> StretchEffect:
@@ -161,7 +161,7 @@ def _best(nothing: StretchEffect, tested: Sequence[StretchEffect]) -> StretchEff
     """Return an effect at the point of its grid where it explains most of the stretch."""
     if not tested:
         return nothing
-    best = min(tested, key=lambda one: (one.p_value, -np.nan_to_num(one.here.score, nan=-1.0)))
+    best = min(tested, key=lambda candidate: (candidate.p_value, -np.nan_to_num(candidate.here.score, nan=-1.0)))
     # the largest of several tries is larger than any one of them: Bonferroni
     return replace(best, p_value=min(1.0, len(tested) * best.p_value))
 
@@ -205,15 +205,20 @@ def _is_all_seen(columns: Float) -> bool:
     return bool(np.all(np.sum(columns**2, axis=0) > 0.0))
 
 
-def _ranked(found: Sequence[StretchEffect]) -> tuple[StretchEffect, ...]:
+def _ranked(candidates: Sequence[StretchEffect]) -> tuple[StretchEffect, ...]:
     """Return effects with their p-values adjusted for their number, the least likely to be nothing first."""
-    tested = [one for one in found if np.isfinite(one.here.score)]
-    raised = adjusted([one.p_value for one in tested])
-    tested = [replace(one, p_adjusted=p) for one, p in zip(tested, raised, strict=True)]
-    tested.sort(key=lambda one: (one.p_value == 1.0, -one.here.score, one.effect.name))
-    rest = sorted((one for one in found if not np.isfinite(one.here.score)), key=lambda one: one.effect.name)
-    return (*(replace(one, alike=_alike(one, tested)) for one in tested), *rest)
+    tested = [candidate for candidate in candidates if np.isfinite(candidate.here.score)]
+    raised = adjusted([candidate.p_value for candidate in tested])
+    tested = [replace(candidate, p_adjusted=p) for candidate, p in zip(tested, raised, strict=True)]
+    tested.sort(key=lambda candidate: (candidate.p_value == 1.0, -candidate.here.score, candidate.effect.name))
+    rest = sorted(
+        (candidate for candidate in candidates if not np.isfinite(candidate.here.score)),
+        key=lambda candidate: candidate.effect.name,
+    )
+    return (*(replace(candidate, alike=_alike(candidate, tested)) for candidate in tested), *rest)
 
 
-def _alike(one: StretchEffect, others: Sequence[StretchEffect]) -> tuple[str, ...]:
-    return tuple(o.effect.name for o in others if o is not one and cosine_squared(one.direction, o.direction) > ALIKE)
+def _alike(candidate: StretchEffect, others: Sequence[StretchEffect]) -> tuple[str, ...]:
+    return tuple(
+        o.effect.name for o in others if o is not candidate and cosine_squared(candidate.direction, o.direction) > ALIKE
+    )

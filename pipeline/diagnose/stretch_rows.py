@@ -99,7 +99,7 @@ def rows_of(base: PooledFit, fitted: Sequence[bool], number: int, inside: Mask) 
     line = base.linearised[number]
     of_instant, _ = np.nonzero(np.isfinite(line.passed.innovation))
     own = np.flatnonzero(inside[of_instant])
-    first = sum(one.u.size for one in base.linearised[:number])
+    first = sum(manoeuvre.u.size for manoeuvre in base.linearised[:number])
     at = first + np.concatenate([own, own + of_instant.size])
     instants = int(np.unique(of_instant[own]).size)
     if fitted[number]:

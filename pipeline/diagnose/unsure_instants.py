@@ -75,12 +75,12 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     workers : Executor
         Share the passes; nothing depends on it.
     """
-    known = np.nan_to_num(fit.covariance)
+    covariance = np.nan_to_num(fit.covariance)
     rows, std_s, foreign = _rows(fit, workers)
     smoothed = _smoothed(fit, workers)
     if not std_s.size and not smoothed.size:
-        return WithInstants(fit, np.zeros_like(known))
-    shared, m, parts = known.shape[0], std_s.size, std_s.size + smoothed.shape[1]
+        return WithInstants(fit, np.zeros_like(covariance))
+    shared, m, parts = covariance.shape[0], std_s.size, std_s.size + smoothed.shape[1]
     columns = np.column_stack([rows, smoothed])
     across, own, score = np.zeros((shared, parts)), np.zeros((m, parts)), np.zeros(m)
     first = 0
@@ -94,7 +94,7 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
         own += late[:, :m].T @ late
         score += foreign * (late[:, :m].T @ line.u)
     # what every column does beside the hull, and each to the hull
-    beside, to_hull = own - across[:, :m].T @ known @ across, known @ across
+    beside, to_hull = own - across[:, :m].T @ covariance @ across, covariance @ across
     late_covariance = inverse(beside[:, :m] + np.diag(std_s**-2.0))
     late_s = np.clip(late_covariance @ score, -_MOST * std_s, _MOST * std_s)
     # at the maximum the scores of what is shared are zero
@@ -112,7 +112,7 @@ def within_rows(fit: PooledFit, effect: Effect) -> bool:
     if of is None:
         return False
     own = (of, "smoothing_s") if of == "velocity_s" else (of,)
-    std_s = max(hypot(*(getattr(one.run.instant_errors, field) for field in own)) for one in fit.runs)
+    std_s = max(hypot(*(getattr(filtered.run.instant_errors, field) for field in own)) for filtered in fit.runs)
     return bool(abs(fit.values[-1]) < _APART * std_s)
 
 
@@ -122,14 +122,18 @@ def _rows(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
     There is one for every instrument and log whose instants are not known. The last of shape (m,) is 0 where the model
     has the latency itself, which imitates it in full: at the maximum nothing is left of it to be found.
     """
-    errors = {effect: [getattr(one.run.instant_errors, of) for one in fit.runs] for of, effect in _LATE.items()}
+    errors = {
+        effect: [getattr(filtered.run.instant_errors, of) for filtered in fit.runs] for of, effect in _LATE.items()
+    }
     unsure = {effect: std for effect, std in errors.items() if any(std)}
     has = [effect.name for effect in fit.model.effects]
     tried = [effect for effect in unsure if effect not in has]
-    found = dict(zip(tried, responses(fit, [EffectTrial(get(one), (_STEP_S,)) for one in tried], workers), strict=True))
+    by_effect = dict(
+        zip(tried, responses(fit, [EffectTrial(get(name), (_STEP_S,)) for name in tried], workers), strict=True)
+    )
     columns, std_s, foreign = [np.zeros((sum(line.u.size for line in fit.linearised), 0))], [np.zeros(0)], []
     for effect, std in unsure.items():
-        column = _own(fit, has.index(effect)) if effect in has else found[effect]
+        column = _own(fit, has.index(effect)) if effect in has else by_effect[effect]
         if column is None:
             continue
         own, known_to = _by_log(fit, column, std)
@@ -146,7 +150,7 @@ def _smoothed(fit: PooledFit, workers: Executor) -> Float:
     readings themselves change, so that what they are late by as a signal and what they have lost of their noise is in
     it.
     """
-    late = [float(one.run.instant_errors.smoothing_s > 0.0) for one in fit.runs]
+    late = [float(filtered.run.instant_errors.smoothing_s > 0.0) for filtered in fit.runs]
     size = sum(line.u.size for line in fit.linearised)
     if not any(late):
         return np.zeros((size, 0))
@@ -177,8 +181,8 @@ def _by_log(fit: PooledFit, column: Float, errors: Sequence[float]) -> tuple[Flo
     errors : sequence of float
         Of every run.
     """
-    day = np.repeat([one.run.day for one in fit.runs], [line.u.size for line in fit.linearised])
-    of_day = {one.run.day: s for one, s in zip(fit.runs, errors, strict=True) if s > 0.0}
+    day = np.repeat([filtered.run.day for filtered in fit.runs], [line.u.size for line in fit.linearised])
+    of_day = {filtered.run.day: s for filtered, s in zip(fit.runs, errors, strict=True) if s > 0.0}
     logs = sorted(of_day)
     columns = np.where(day[:, None] == logs, column.reshape(-1, 1), 0.0)
     return columns, np.array([of_day[number] for number in logs])

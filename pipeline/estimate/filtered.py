@@ -111,8 +111,8 @@ class RunFilter:
 
         See `free_from`; ``start`` is of shape (8,).
         """
-        one: Float = self.free_from(hull, values, start[:, None])[..., 0]
-        return one
+        predicted: Float = self.free_from(hull, values, start[:, None])[..., 0]
+        return predicted
 
     def free_from(self, hull: Float, values: Float, starts: Float) -> Float:
         """Let the ship run from several states on, with no measurement taken in; return what would be measured.
@@ -136,7 +136,7 @@ class RunFilter:
         hulls, levels, same = (np.repeat(column[:, None], k, axis=1) for column in (hull, quiet, values))
         P0 = np.zeros((x0.shape[0], x0.shape[0]))
         passes = self._passes(hulls, levels, same, x0, P0, states=False, withheld=held, still=True)
-        return np.stack([one.predicted for one in passes], axis=-1)
+        return np.stack([passed.predicted for passed in passes], axis=-1)
 
     def _passes(
         self,
@@ -151,15 +151,15 @@ class RunFilter:
         still: bool = False,
     ) -> list[Passed]:
         """Run the filter in groups of lanes, and what is left over by itself or in a group filled up with itself."""
-        done: list[Passed] = []
-        while len(done) < hulls.shape[1]:
-            left = hulls.shape[1] - len(done)
+        passes: list[Passed] = []
+        while len(passes) < hulls.shape[1]:
+            left = hulls.shape[1] - len(passes)
             lanes, together = (LANES, MOST) if left > _ALONE else (ONE, 1)
-            at = np.minimum(len(done) + np.arange(together), hulls.shape[1] - 1)
+            at = np.minimum(len(passes) + np.arange(together), hulls.shape[1] - 1)
             hull, level, value, start = (np.ascontiguousarray(part[:, at]) for part in (hulls, levels, values, x0))
-            made = self._lanes(hull, level, value, start, P0, lanes, states=states, withheld=withheld, still=still)
-            done += made[: min(left, together)]
-        return done
+            group = self._lanes(hull, level, value, start, P0, lanes, states=states, withheld=withheld, still=still)
+            passes += group[: min(left, together)]
+        return passes
 
     def _lanes(
         self,
@@ -188,7 +188,7 @@ class RunFilter:
             *(np.full((n, 3, k), np.nan), np.full((n, 3, k), np.nan)),
             *(np.empty((rows, size, k)), np.empty((rows, size, k))),
         )
-        found = extended(
+        log_likelihoods = extended(
             *(hulls, levels, values, run.step_s, run.inputs, rudders, run.rudder_noise, run.measured),
             *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row),
             run.constants(spec.rudder_speed_exponent),
@@ -196,6 +196,13 @@ class RunFilter:
         )
         predicted, variance, filtered, spread = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in kept)
         return [
-            Passed(float(found[b]), run.measured - predicted[b], variance[b], predicted[b], filtered[b], spread[b])
+            Passed(
+                float(log_likelihoods[b]),
+                run.measured - predicted[b],
+                variance[b],
+                predicted[b],
+                filtered[b],
+                spread[b],
+            )
             for b in range(k)
         ]

@@ -50,5 +50,5 @@ def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) ->
         objective = CommonLikelihood([filtered], workers)
         objective.active[: objective.shared] = False
         begin = np.concatenate([hull, values / objective.unit, start])
-        found = climb_in_variances(objective, begin, _MAX_ITERATIONS, _DECREMENT)
-    return Levels(found.theta[objective.shared :], found.log_likelihood, found.converged)
+        search = climb_in_variances(objective, begin, _MAX_ITERATIONS, _DECREMENT)
+    return Levels(search.theta[objective.shared :], search.log_likelihood, search.converged)

@@ -93,10 +93,10 @@ class Likelihood:
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, error.rate_per_s),
         )
-        taken = np.zeros(record.time_s.size, dtype=np.bool_)
+        withheld = np.zeros(record.time_s.size, dtype=np.bool_)
         noise = (record.rudder_noise_rad_sqrt_s, error.gain_rad_s_m)
         inputs = (record.time_s, record.speed_m_s, record.rudder_rad, *noise)
-        self._fixed = (*inputs, record.measured, taken, row, arm_per_m, *rates, longest, np.zeros(N_STATE), P0)
+        self._fixed = (*inputs, record.measured, withheld, row, arm_per_m, *rates, longest, np.zeros(N_STATE), P0)
         self.low = np.concatenate([np.full(6, -np.inf), np.log(sigma_low)])
         self.high = np.concatenate([np.full(6, np.inf), np.log(sigma_high)])
         # a disturbance that the specification leaves out has no intensity at all

@@ -76,13 +76,13 @@ def report(
     theta = best.theta
     movable = free(objective, theta, best.score)
     index = np.flatnonzero(movable)
-    known = from_information(best.information, index)
+    uncertainty = from_information(best.information, index)
     fit = one_step_fit(objective.record.measured, trace.innovation, trace.variance)
-    covariance, kind, widened = known.covariance, "information", 1.0
+    covariance, kind, widened = uncertainty.covariance, "information", 1.0
     if not_white(fit):
         scores = objective.trace(theta, scores=True).scores.sum(axis=1)
-        robust = sandwich(known.covariance, scores, objective.record.time_s)
-        ratio = np.sqrt(np.diag(robust)[:6] / np.diag(known.covariance)[:6])
+        robust = sandwich(uncertainty.covariance, scores, objective.record.time_s)
+        ratio = np.sqrt(np.diag(robust)[:6] / np.diag(uncertainty.covariance)[:6])
         if np.nanmax(ratio, initial=0.0) > 1.0:
             covariance, kind, widened = robust, "sandwich", float(np.nanmax(ratio))
     bounds = [_NAMES[i] for i in np.flatnonzero(objective.active & ~movable)]
@@ -101,7 +101,7 @@ def report(
     # as shares of the hull parameters; those of the logarithms are shares already
     scale = np.concatenate([np.abs(theta[:_HULL]), np.ones(theta.size - _HULL)])
     off = dict(zip(names, (np.sqrt(np.diag(covariance)) / scale)[index], strict=True))
-    warnings += _vague(known.weak, names, off)
+    warnings += _vague(uncertainty.weak, names, off)
     speed = record.mean_speed_m_s
     return Estimate(
         estimator="ml",
@@ -117,10 +117,10 @@ def report(
             "speed_m_s": speed,
             "step_s": discrete_step_s,
             "log_likelihood": best.log_likelihood,
-            "condition": known.condition,
+            "condition": uncertainty.condition,
             "active_bounds": bounds,
             "weak_directions": [
-                {"eigenvalue": value, "direction": _largest(vector, names)} for value, vector in known.weak
+                {"eigenvalue": value, "direction": _largest(vector, names)} for value, vector in uncertainty.weak
             ],
             "standard_errors": kind,
             "widened": widened,
@@ -128,7 +128,7 @@ def report(
             "changes": _changes(noise, objective.spec),
             **details,
         },
-        iterations=tuple(_iteration(count, one) for count, one in enumerate(best.passes)),
+        iterations=tuple(_iteration(count, step) for count, step in enumerate(best.passes)),
         fit=fit,
         warnings=(*warnings, *plausibility_warnings(theta[:6], np.sqrt(np.diag(hull_covariance)), fit)),
     )
@@ -226,14 +226,14 @@ def _changes(noise: tuple[Value, ...], spec: ModelSpec) -> dict[str, dict[str, A
     }
     per_level = {name: change_within(1.0, _CHANGE_S, rate) for name, rate in rates.items()}
     return {
-        one.name: {
-            "value": per_level[one.name] * one.value,
-            "std": None if np.isnan(one.std) else per_level[one.name] * one.std,
-            "unit": one.unit,
+        level.name: {
+            "value": per_level[level.name] * level.value,
+            "std": None if np.isnan(level.std) else per_level[level.name] * level.std,
+            "unit": level.unit,
             "within_s": _CHANGE_S,
         }
-        for one in noise
-        if one.name in rates
+        for level in noise
+        if level.name in rates
     }
 
 
@@ -259,9 +259,9 @@ def _largest(vector: Float, names: list[str]) -> dict[str, float]:
     return {names[i]: float(vector[i]) for i in np.argsort(-np.abs(vector), kind="stable")[:3]}
 
 
-def _iteration(count: int, one: Pass) -> dict[str, Any]:
-    parameters = dict(zip(HULL_PARAMETERS, (float(t) for t in one.theta[:6]), strict=True))
-    sigmas = dict(zip(NOISE_PARAMETERS, (float(np.exp(t)) for t in one.theta[6:]), strict=True))
-    gain = None if np.isnan(one.expected_gain) else one.expected_gain
-    entry = {"iteration": count, "log_likelihood": one.log_likelihood, "expected_gain": gain, "damping": one.damping}
+def _iteration(count: int, step: Pass) -> dict[str, Any]:
+    parameters = dict(zip(HULL_PARAMETERS, (float(t) for t in step.theta[:6]), strict=True))
+    sigmas = dict(zip(NOISE_PARAMETERS, (float(np.exp(t)) for t in step.theta[6:]), strict=True))
+    gain = None if np.isnan(step.expected_gain) else step.expected_gain
+    entry = {"iteration": count, "log_likelihood": step.log_likelihood, "expected_gain": gain, "damping": step.damping}
     return {**entry, **parameters, **sigmas}

@@ -162,7 +162,7 @@ def _from_all_starts(
         return climb(objective, theta, settings.max_iterations, settings.decrement)
 
     started = dict(entries)
-    finals = [(name, _raised(found.theta, started[name], coarse)) for name, found in _distinct(race, settings.starts)]
+    finals = [(name, _raised(end.theta, started[name], coarse)) for name, end in _distinct(race, settings.starts)]
     searches = [(name, to_the_end(theta)) for name, theta in finals]
     if not any(np.isfinite(search.log_likelihood) for _, search in searches):
         # the race ran into ships that the whole record excludes: from the starting points themselves, then

@@ -50,7 +50,7 @@ def one_step_fit(measured: Float, innovation: Float, variance: Float) -> dict[st
     channels: dict[str, Any] = {}
     for i, name in enumerate(MEASUREMENTS):
         good = np.isfinite(innovation[:, i])
-        made = int(np.count_nonzero(good))
+        count = int(np.count_nonzero(good))
         # the first predictions only carry how little was known of the initial state
         good[good] = variance[good, i] < _SETTLED * np.median(variance[good, i]) if good.any() else False
         if np.count_nonzero(good) < 3:
@@ -60,7 +60,7 @@ def one_step_fit(measured: Float, innovation: Float, variance: Float) -> dict[st
             "rms": float(np.sqrt(np.mean(e**2))),
             "fit_percent": fit_percent(measured[good, i], e),
             "n": int(e.size),
-            "settling": made - int(e.size),
+            "settling": count - int(e.size),
             "lag1_autocorrelation": float(np.sum(white[1:] * white[:-1]) / np.sum(white**2)),
             "inside_95_percent": float(np.mean(np.abs(white) < 1.96)),
         }

@@ -107,12 +107,12 @@ def fit_plain(
     DataRejected
         ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
     """
-    made = []
-    for one in workers.map(lambda run: fitted_alone(run, spec, settings), runs):
-        made.append(one)
-        listener.counted(len(made), len(runs))
-    alone = tuple(single for single in made if isinstance(single, Alone))
-    left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
+    outcomes = []
+    for outcome in workers.map(lambda run: fitted_alone(run, spec, settings), runs):
+        outcomes.append(outcome)
+        listener.counted(len(outcomes), len(runs))
+    alone = tuple(single for single in outcomes if isinstance(single, Alone))
+    left_out = {run.name: why for run, why in zip(runs, outcomes, strict=True) if isinstance(why, str)}
     if not alone:
         raise DataRejected(
             "no_ship_explains_it",
@@ -124,25 +124,25 @@ def fit_plain(
     layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
     levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
     mean = alone[0].hull if len(alone) == 1 else _weighted_mean(alone)
-    found = climbed(layout, np.concatenate([mean, levels]), listener=listener) if np.all(np.isfinite(mean)) else None
-    if found is None or not np.isfinite(found.log_likelihood):
+    search = climbed(layout, np.concatenate([mean, levels]), listener=listener) if np.all(np.isfinite(mean)) else None
+    if search is None or not np.isfinite(search.log_likelihood):
         # the mean is no ship: from the best of a few runs' own, then
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
-        found = climbed(layout, np.concatenate([best, levels]), listener=listener)
+        search = climbed(layout, np.concatenate([best, levels]), listener=listener)
     separate = sum(single.search.log_likelihood for single in alone)
-    if not (found.converged and _agreement(alone, separate, found).p_value >= LEVEL):
+    if not (search.converged and _agreement(alone, separate, search).p_value >= LEVEL):
         # runs that seem to be of two ships may have been climbed on a lower hill
         hull = mariner_like(runs[0].ship.length_m).array()
         other = climbed(layout, np.concatenate([hull, levels]), listener=listener)
-        if other.converged and other.log_likelihood > found.log_likelihood + _HIGHER:
-            found = other
-    return PlainFit(ended(layout, found), alone, left_out, _agreement(alone, separate, found))
+        if other.converged and other.log_likelihood > search.log_likelihood + _HIGHER:
+            search = other
+    return PlainFit(ended(layout, search), alone, left_out, _agreement(alone, separate, search))
 
 
-def _agreement(alone: Sequence[Alone], separate: float, found: Search[Arrow]) -> Agreement:
+def _agreement(alone: Sequence[Alone], separate: float, search: Search[Arrow]) -> Agreement:
     """Return whether the runs share one hull, six degrees of freedom a run beyond the first."""
-    return Agreement(max(2.0 * (separate - found.log_likelihood), 0.0), _HULL * (len(alone) - 1))
+    return Agreement(max(2.0 * (separate - search.log_likelihood), 0.0), _HULL * (len(alone) - 1))
 
 
 def fitted_alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:

@@ -58,28 +58,28 @@ def plausibility_warnings(hull: Float, std: Float, fit: dict[str, Any]) -> tuple
     """
     a11, _, a21, a22, b1, b2 = (float(p) for p in hull)
     vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
-    found = []
+    warnings = []
     if vague:
         cure = "a zigzag of other angles or more legs, or several pooled, would determine them"
-        found.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
+        warnings.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
     if a11 > 0:
-        found.append("a11 > 0: sway unstable by itself, not physical; an unmodelled force is likely")
+        warnings.append("a11 > 0: sway unstable by itself, not physical; an unmodelled force is likely")
     if a22 > 0:
-        found.append("a22 > 0: yaw unstable by itself, not physical; an unmodelled moment is likely")
+        warnings.append("a22 > 0: yaw unstable by itself, not physical; an unmodelled moment is likely")
     if a21 > 0:
-        found.append("a21 > 0: unusual for a hull; an unmodelled force is likely")
+        warnings.append("a21 > 0: unusual for a hull; an unmodelled force is likely")
     if b2 < 0:
-        found.append("b2 < 0: the rudder turns the ship the wrong way; check the sign of the rudder channel")
+        warnings.append("b2 < 0: the rudder turns the ship the wrong way; check the sign of the rudder channel")
     elif b1 > 0:
-        found.append("b1 > 0: the rudder pushes the stern the wrong way; sway and yaw are hardly distinguished")
+        warnings.append("b1 > 0: the rudder pushes the stern the wrong way; sway and yaw are hardly distinguished")
     unlike_noise = not_white(fit)
     for name, channel in fit.get("channels", {}).items():
         lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]
         if name in unlike_noise:
-            found.append(
+            warnings.append(
                 f"the prediction errors of {name} are not white (lag-1 autocorrelation {lag:.2f}): "
                 "the model lacks something, or the instrument's noise is not independent"
             )
         if inside < _TOO_FEW:
-            found.append(f"only {100 * inside:.0f} % of {name} lie in their 95 % prediction interval")
-    return tuple(found)
+            warnings.append(f"only {100 * inside:.0f} % of {name} lie in their 95 % prediction interval")
+    return tuple(warnings)

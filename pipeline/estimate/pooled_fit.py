@@ -131,7 +131,7 @@ class PooledFit:
         """Lasting noise of instruments: name, value, standard error and unit of each of its parameters."""
         parameters = zip(self.model.names, self.model.parameters, self.values, self.std[N_HULL:], strict=True)
         every = [(name, float(x), float(std), p.unit) for name, (_, p), x, std in parameters]
-        return tuple(one for one, own in zip(every, self.model.of_ship, strict=True) if not own)
+        return tuple(row for row, own in zip(every, self.model.of_ship, strict=True) if not own)
 
     def ship_part(self, covariance: Float) -> ShipPart:
         """Return what it says of the ship, with another covariance of all parameters, shape (6 + p, 6 + p)."""
@@ -141,12 +141,14 @@ class PooledFit:
     @property
     def count(self) -> int:
         """Measurements."""
-        return sum(one.u.size // 2 for one in self.linearised)
+        return sum(line.u.size // 2 for line in self.linearised)
 
     @property
     def last(self) -> Iteration:
         """Where it ended, as a listener hears it."""
-        error = one_step_error([one.run for one in self.runs], [one.passed.innovation for one in self.linearised])
+        error = one_step_error(
+            [filtered.run for filtered in self.runs], [line.passed.innovation for line in self.linearised]
+        )
         return Iteration(self.iterations, self.log_likelihood, error, len(self.runs))
 
     def point(self, number: int) -> Point:
@@ -155,9 +157,9 @@ class PooledFit:
 
     def sigmas(self, number: int) -> dict[str, float]:
         """Return the noise levels that one run has, those of disturbances in the long run, by name, SI."""
-        one = self.runs[number]
-        levels = np.exp(self.levels[number] - to_intensities(one.spec)).tolist()
-        return {name: x for name, x, used in zip(NOISE_PARAMETERS, levels, one.levels_used(), strict=True) if used}
+        filtered = self.runs[number]
+        levels = np.exp(self.levels[number] - to_intensities(filtered.spec)).tolist()
+        return {name: x for name, x, used in zip(NOISE_PARAMETERS, levels, filtered.levels_used(), strict=True) if used}
 
 
 def fit(
@@ -204,10 +206,10 @@ def climbed(
     """Climb a common likelihood from one start and tell of every iteration; see `fit`."""
     number = -1
 
-    def report(one: Pass) -> None:
+    def report(step: Pass) -> None:
         nonlocal number
         number += 1
-        listener.iterated(Iteration(number, one.log_likelihood, layout.error_at(one.theta), len(layout.filtered)))
+        listener.iterated(Iteration(number, step.log_likelihood, layout.error_at(step.theta), len(layout.filtered)))
 
     return climb_in_variances(
         layout, theta, max_iterations, DECREMENT, wanted, nobody if listener is SILENT else report
@@ -234,19 +236,19 @@ def one_step_error(runs: Sequence[GridRun], innovations: Sequence[Float]) -> flo
     return float(np.mean(every)) if every.size else np.nan
 
 
-def ended(layout: CommonLikelihood, found: Search[Arrow]) -> PooledFit:
+def ended(layout: CommonLikelihood, search: Search[Arrow]) -> PooledFit:
     """Return the fit that a search of the likelihood ended at."""
-    theta, shared = found.theta, layout.shared
-    movable = free(layout, theta, found.score)
-    complement, _ = found.information.masked(movable).eliminated()
+    theta, shared = search.theta, layout.shared
+    movable = free(layout, theta, search.score)
+    complement, _ = search.information.masked(movable).eliminated()
     index = np.flatnonzero(movable[:shared])
     back = layout.scale[index]
     covariance = np.full((shared, shared), np.nan)
-    if np.isfinite(found.log_likelihood):
+    if np.isfinite(search.log_likelihood):
         covariance[np.ix_(index, index)] = inverse(complement)[np.ix_(index, index)] * np.outer(back, back)
     lines = layout.linearised_at(theta)
     # of models with and without effects by the same filter, so that they can be compared
-    value = sum(line.passed.log_likelihood for line in lines) if np.isfinite(found.log_likelihood) else -np.inf
+    value = sum(line.passed.log_likelihood for line in lines) if np.isfinite(search.log_likelihood) else -np.inf
     return PooledFit(
         model=layout.model,
         runs=tuple(layout.filtered),
@@ -256,9 +258,9 @@ def ended(layout: CommonLikelihood, found: Search[Arrow]) -> PooledFit:
         log_likelihood=float(value),
         covariance=covariance,
         linearised=lines,
-        converged=found.converged,
-        reason=found.reason,
-        iterations=len(found.passes) - 1,
+        converged=search.converged,
+        reason=search.reason,
+        iterations=len(search.passes) - 1,
     )
 
 
@@ -280,7 +282,7 @@ class CommonLikelihood:
 
     def __init__(self, filtered: Sequence[RunFilter], workers: Executor, before: Parabola | None = None) -> None:
         self.filtered, self.workers, self.model = filtered, workers, filtered[0].model
-        self.linear = () if self.model.effects else tuple(one.linear() for one in filtered)
+        self.linear = () if self.model.effects else tuple(run.linear() for run in filtered)
         self.shared = N_HULL + len(self.model.names)
         runs = len(filtered)
         # effects are counted in steps of a size that the search may take at once
@@ -317,7 +319,7 @@ class CommonLikelihood:
         """
         there = np.array_equal(theta, self.top)
         passes = [line.passed for line in self.lines] if there else self._passed(theta)
-        return one_step_error([one.run for one in self.filtered], [one.innovation for one in passes])
+        return one_step_error([filtered.run for filtered in self.filtered], [passed.innovation for passed in passes])
 
     def full(self, theta: Float) -> tuple[float, Float, Arrow]:
         """Log-likelihood, score and expected information, summed in the order of the runs."""
@@ -345,9 +347,9 @@ class CommonLikelihood:
             own = np.concatenate([point.hull, point.levels - to_intensities(linear.spec)])
             return linear.full(np.clip(own, linear.low, linear.high))
 
-        made = list(self.workers.map(one, range(len(self.linear))))
-        return sum(value for value, _, _ in made) - self._loss(theta), [
-            (score, information) for _, score, information in made
+        answers = list(self.workers.map(one, range(len(self.linear))))
+        return sum(value for value, _, _ in answers) - self._loss(theta), [
+            (score, information) for _, score, information in answers
         ]
 
     def _extended(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
@@ -421,10 +423,10 @@ def _finished(
         i, wanted = job
         return sensitivity.columns(filtered[i], points[i], begun[i][0], wanted)
 
-    found = [list(columns) for _, columns in begun]
+    jacobians = [list(columns) for _, columns in begun]
     for (i, _), columns in zip(jobs, workers.map(more, jobs), strict=True):
-        found[i] += columns
-    return tuple(_line(run, base, own) for run, (base, _), own in zip(filtered, begun, found, strict=True))
+        jacobians[i] += columns
+    return tuple(_line(run, base, own) for run, (base, _), own in zip(filtered, begun, jacobians, strict=True))
 
 
 def _line(run: RunFilter, base: Passed, columns: Sequence[Float]) -> Linearised:

@@ -37,7 +37,7 @@ class PooledUncertainty:
 def uncertainty_of(fit: PooledFit) -> PooledUncertainty:
     """Return the standard errors of a common fit, the larger ones where prediction errors are not white."""
     steps = _one_step(fit)
-    if any(not_white(one) for one in steps):
+    if any(not_white(step) for step in steps):
         robust = _sandwich(fit)
         with np.errstate(invalid="ignore"):
             wider = np.nanmax(np.diag(robust) / np.diag(fit.covariance), initial=0.0)
@@ -61,7 +61,7 @@ def uncertainty_beside(fit: PooledFit, before: Parabola) -> PooledUncertainty:
     """
     steps = _one_step(fit)
     own = fit.covariance @ (inverse(fit.covariance) - before.information) @ fit.covariance
-    if any(not_white(one) for one in steps):
+    if any(not_white(step) for step in steps):
         robust = _sandwich(fit)
         if np.max(np.diag(robust) / np.maximum(np.diag(own), 1e-300), initial=0.0) > 1.0:
             return PooledUncertainty(robust, "sandwich", steps)
@@ -93,7 +93,7 @@ def _scores(line: Linearised, shared: int) -> Float:
     each = line.J[:m] * line.u[:m, None] + line.J[m:] * line.u[m:, None]
     common = [k for k, i in enumerate(line.index) if i < shared]
     own = [k for k, i in enumerate(line.index) if i >= shared]
-    found = np.zeros((m, shared))
+    scores = np.zeros((m, shared))
     carried = line.J[:, common].T @ line.J[:, own] @ inverse(line.J[:, own].T @ line.J[:, own])
-    found[:, [line.index[k] for k in common]] = each[:, common] - each[:, own] @ carried.T
-    return found
+    scores[:, [line.index[k] for k in common]] = each[:, common] - each[:, own] @ carried.T
+    return scores

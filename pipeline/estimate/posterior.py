@@ -81,7 +81,7 @@ def from_json(content: Mapping[str, Any]) -> Posterior:
 
 def posterior_of(
     fit: PooledFit,
-    known: PooledUncertainty,
+    uncertainty: PooledUncertainty,
     agreement: Agreement,
     log_likelihood: float,
     late: Float | float = 0.0,
@@ -90,7 +90,7 @@ def posterior_of(
 
     Parameters
     ----------
-    known : PooledUncertainty
+    uncertainty : PooledUncertainty
         Its errors, not widened by what the runs disagree about, with those of instants.
     agreement : Agreement
         Of all runs that it rests on.
@@ -101,4 +101,6 @@ def posterior_of(
     """
     names = (*HULL_PARAMETERS, *fit.model.names)
     point = np.concatenate([fit.hull, fit.values])
-    return Posterior(names, point, fit.covariance + late, known.covariance, known.kind, agreement, log_likelihood)
+    return Posterior(
+        names, point, fit.covariance + late, uncertainty.covariance, uncertainty.kind, agreement, log_likelihood
+    )

@@ -60,10 +60,10 @@ def passes(filtered: RunFilter, points: Sequence[Point]) -> list[Passed]:
     return filtered.run_filters(hulls, np.exp(levels), np.stack([p.values for p in points], axis=-1))
 
 
-def whitened(one: Passed) -> Float:
+def whitened(base: Passed) -> Float:
     """Return u, shape (2 m,): over the measurements made, whitened innovations, then what shows their spread."""
-    made = np.isfinite(one.innovation)
-    z = one.innovation[made] / np.sqrt(one.variance[made])
+    made = np.isfinite(base.innovation)
+    z = base.innovation[made] / np.sqrt(base.variance[made])
     return np.concatenate([z, (z * z - 1.0) / _ROOT_2])
 
 

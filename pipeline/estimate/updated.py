@@ -85,9 +85,9 @@ def updated(
     Updated or None
         None where all runs are to be fitted anew.
     """
-    made = list(workers.map(lambda run: fitted_alone(run, spec, settings), runs))
-    alone = tuple(single for single in made if isinstance(single, Alone))
-    left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
+    outcomes = list(workers.map(lambda run: fitted_alone(run, spec, settings), runs))
+    alone = tuple(single for single in outcomes if isinstance(single, Alone))
+    left_out = {run.name: why for run, why in zip(runs, outcomes, strict=True) if isinstance(why, str)}
     if not alone:
         return None
     layout = CommonLikelihood([RunFilter(single.run, model, spec) for single in alone], workers, before.parabola)

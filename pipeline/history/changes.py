@@ -93,20 +93,20 @@ def find_changes(history: ParameterHistory, settings: ChangeSettings | None = No
     whole = stretch(merged, settings)
     p_value = judge(whole, settings.level).p_value
     places = _search(merged, settings, settings.level, 0)
-    found = tuple(_fitted(merged, settings, places, i) for i in range(len(places)))
-    steps, drifts = (sum(c.kind == kind for c in found) for kind in ("step", "drift"))
+    changes = tuple(_fitted(merged, settings, places, i) for i in range(len(places)))
+    steps, drifts = (sum(c.kind == kind for c in changes) for kind in ("step", "drift"))
     verdict = (
         "no change seen"
-        if not found
+        if not changes
         else " and ".join([*([] if not steps else ["step" if steps == 1 else "steps"]), *(["drift"] if drifts else [])])
     )
-    quiet = _without(merged, found)
+    quiet = _without(merged, changes)
     rest = stretch(quiet, settings)
     tau = np.sqrt(rest.statistics(rest.value).scatter[p:]) * rest.scale
     smallest = smallest_steps(rest, judge(rest, settings.level)) * np.abs(rest.scale)
     share = f"{100 * p_value:{'.2g' if p_value < 0.99 else '.0f'}} %"
-    said = f"in {share} of histories without change something at least as remarkable is seen"
-    return Changes(verdict, said, found, p_value, merged.time_utc_ns, tau, mean, smallest, settings)
+    sentence = f"in {share} of histories without change something at least as remarkable is seen"
+    return Changes(verdict, sentence, changes, p_value, merged.time_utc_ns, tau, mean, smallest, settings)
 
 
 def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings: ChangeSettings) -> str:
@@ -141,14 +141,14 @@ def _search(history: ParameterHistory, settings: ChangeSettings, level: float, f
     """Search a stretch that begins at set ``first`` of the whole."""
     if len(history) < settings.fewest or history.time_utc_ns[0] == history.time_utc_ns[-1]:
         return []
-    one = stretch(history, settings)
-    verdict = judge(one, level)
+    span = stretch(history, settings)
+    verdict = judge(span, level)
     if verdict.p_value > level:
         return []
-    lead, last = effects.preference(one), first + len(history)
+    lead, last = effects.preference(span), first + len(history)
     if lead > 0:
         return [_Place("drift", first, first, last, verdict.p_value, lead)]
-    k = _likeliest(one)
+    k = _likeliest(span)
     left, right = (
         _search(_part(history, which), settings, level / 2, begin)
         for which, begin in ((slice(0, k), first), (slice(k, None), first + k))
@@ -156,8 +156,8 @@ def _search(history: ParameterHistory, settings: ChangeSettings, level: float, f
     return [*left, _Place("step", first, first + k, last, verdict.p_value, -lead), *right]
 
 
-def _likeliest(one: Stretch) -> int:
-    return int(np.argmax(one.statistics(one.value).step.max(axis=-1))) + one.settings.smallest_side
+def _likeliest(span: Stretch) -> int:
+    return int(np.argmax(span.statistics(span.value).step.max(axis=-1))) + span.settings.smallest_side
 
 
 def _fitted(history: ParameterHistory, settings: ChangeSettings, places: list[_Place], i: int) -> Change:
@@ -171,11 +171,11 @@ def _fitted(history: ParameterHistory, settings: ChangeSettings, places: list[_P
     beside = [q for q in places if q.kind == "drift" and place.split in (q.first, q.last)]
     level, extra = _levelled(history, settings, beside, place.split)
     some = _part(level, slice(before, after))
-    one = stretch(some, settings)
+    span = stretch(some, settings)
     # beside a drift the sides have been made level for this very split
-    k = place.split - before if beside else _likeliest(one)
-    found = _step(some, one, k, place.p_value, place.rival)
-    return replace(found, std=np.hypot(found.std, extra))
+    k = place.split - before if beside else _likeliest(span)
+    change = _step(some, span, k, place.p_value, place.rival)
+    return replace(change, std=np.hypot(change.std, extra))
 
 
 def _levelled(
@@ -192,11 +192,11 @@ def _levelled(
     value, variance = history.value.copy(), np.zeros(len(history.names))
     for place in drifts:
         some = _part(history, slice(place.first, place.last))
-        one = stretch(some, settings)
-        rate, p = effects.drift_of(one, one.value), len(history.names)
-        ends = one.years - (one.years[-1] if place.last == split else one.years[0])
-        value[place.first : place.last] -= np.outer(ends, rate.change[p:] * one.scale)
-        variance += (np.mean(ends) * rate.std[p:] * one.scale) ** 2
+        span = stretch(some, settings)
+        rate, p = effects.drift_of(span, span.value), len(history.names)
+        ends = span.years - (span.years[-1] if place.last == split else span.years[0])
+        value[place.first : place.last] -= np.outer(ends, rate.change[p:] * span.scale)
+        variance += (np.mean(ends) * rate.std[p:] * span.scale) ** 2
     level = ParameterHistory(history.names, history.units, history.time_utc_ns, value, history.covariance)
     return level, np.sqrt(variance)
 
@@ -207,49 +207,53 @@ def _part(history: ParameterHistory, which: slice) -> ParameterHistory:
     return ParameterHistory(h.names, h.units, h.time_utc_ns[which], h.value[which], h.covariance[which])
 
 
-def _step(history: ParameterHistory, one: Stretch, k: int, p_value: float, rival: float) -> Change:
-    time, level = history.time_utc_ns, one.settings.level
-    intervals = effects.step_intervals(one, k, level)
+def _step(history: ParameterHistory, span: Stretch, k: int, p_value: float, rival: float) -> Change:
+    time, level = history.time_utc_ns, span.settings.level
+    intervals = effects.step_intervals(span, k, level)
     between = (int(time[k - 1]), int(time[k]))
     interval = (int(time[intervals.splits.min() - 1]), int(time[intervals.splits.max()]))
-    return _change("step", one, effects.step_at(one, one.value, k), intervals.width, between, interval, p_value, rival)
+    return _change(
+        "step", span, effects.step_at(span, span.value, k), intervals.width, between, interval, p_value, rival
+    )
 
 
-def _drift(history: ParameterHistory, one: Stretch, p_value: float, rival: float) -> Change:
+def _drift(history: ParameterHistory, span: Stretch, p_value: float, rival: float) -> Change:
     ends = (int(history.time_utc_ns[0]), int(history.time_utc_ns[-1]))
-    width = effects.drift_intervals(one, one.settings.level).width
-    return _change("drift", one, effects.drift_of(one, one.value), width, ends, ends, p_value, rival)
+    width = effects.drift_intervals(span, span.settings.level).width
+    return _change("drift", span, effects.drift_of(span, span.value), width, ends, ends, p_value, rival)
 
 
 def _change(
     kind: Kind,
-    one: Stretch,
-    found: effects.Contrast,
+    span: Stretch,
+    contrast: effects.Contrast,
     width: float,
     between: tuple[int, int],
     interval: tuple[int, int],
     p_value: float,
     rival: float,
 ) -> Change:
-    p = one.value.shape[1]
+    p = span.value.shape[1]
     return Change(
         kind,
         between,
         interval,
         p_value,
-        found.before[p:] * one.scale,
-        found.change[p:] * one.scale,
-        found.std[p:] * np.abs(one.scale),
+        contrast.before[p:] * span.scale,
+        contrast.change[p:] * span.scale,
+        contrast.std[p:] * np.abs(span.scale),
         width,
         rival,
-        tuple((j, size * one.scale[j], std * abs(one.scale[j])) for j, size, std in effects.alone(one, found, width)),
+        tuple(
+            (j, size * span.scale[j], std * abs(span.scale[j])) for j, size, std in effects.alone(span, contrast, width)
+        ),
     )
 
 
-def _without(history: ParameterHistory, found: tuple[Change, ...]) -> ParameterHistory:
+def _without(history: ParameterHistory, changes: tuple[Change, ...]) -> ParameterHistory:
     """Return the history with the changes found taken off, so that what is left is scatter."""
     value = history.value.copy()
-    for change in found:
+    for change in changes:
         time = history.time_utc_ns
         first, last = change.between_utc_ns
         if change.kind == "step":

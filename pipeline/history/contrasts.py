@@ -69,8 +69,8 @@ def directions(covariance: Float) -> Float:
 
 def variances(covariance: Float, along: Float) -> Float:
     """Return the variances of the sets along directions, shape (n_set, n_direction)."""
-    found: Float = np.einsum("ac,iab,bc->ic", along, covariance, along)
-    return found
+    variance: Float = np.einsum("ac,iab,bc->ic", along, covariance, along)
+    return variance
 
 
 @lru_cache(maxsize=512)
@@ -95,14 +95,14 @@ def scatter(z: Float, variance: Float) -> Float:
     """
     squares, own = np.diff(z, axis=-2) ** 2, variance[1:] + variance[:-1]
     expected = _kept(own.shape[0])
-    found = np.zeros((*z.shape[:-2], 1, z.shape[-1]))
+    tau2 = np.zeros((*z.shape[:-2], 1, z.shape[-1]))
     for _ in range(_ROUNDS):
-        precision = 1.0 / (own + 2.0 * found)
+        precision = 1.0 / (own + 2.0 * tau2)
         share = squares * precision
         excess = np.sum(share, axis=-2, keepdims=True) - np.max(share, axis=-2, keepdims=True) - expected
         slope = 2.0 * np.mean(precision, axis=-2, keepdims=True) * (own.shape[0] - 1)
-        found = np.maximum(0.0, found + excess / slope)
-    return found
+        tau2 = np.maximum(0.0, tau2 + excess / slope)
+    return tau2
 
 
 def _windows(n: int, smallest_side: int) -> list[tuple[int, int]]:
@@ -130,16 +130,16 @@ def _steps(W: Float, B: Float, smallest_side: int) -> Float:
     ndarray, shape (..., n_split, n_direction)
     """
     n = W.shape[-2]
-    found = np.zeros((*W.shape[:-2], n - 2 * smallest_side + 1, W.shape[-1]))
+    gains = np.zeros((*W.shape[:-2], n - 2 * smallest_side + 1, W.shape[-1]))
     for first, last in _windows(n, smallest_side):
         w0, b0 = (x[..., first - 1 : first, :] if first else 0.0 for x in (W, B))
         w, b = (x[..., last - 1 : last, :] - x0 for x, x0 in ((W, w0), (B, b0)))
         inner = slice(first + smallest_side - 1, last - smallest_side)
         before = W[..., inner, :] - w0
         gain = (B[..., inner, :] - b0 - before * (b / w)) ** 2 * w / (before * (w - before))
-        place = found[..., first : last - 2 * smallest_side + 1, :]
+        place = gains[..., first : last - 2 * smallest_side + 1, :]
         np.maximum(place, gain, out=place)
-    return found
+    return gains
 
 
 def statistics(z: Float, variance: Float, time: Float, smallest_side: int, prior_dof: float) -> Statistics:

@@ -13,7 +13,7 @@ from kempf.pipeline.history.pooled import Pooled
 from kempf.pipeline.history.sets import ParameterHistory
 
 
-def report(history: ParameterHistory, pooled: Pooled | None, found: Changes) -> dict[str, Any]:
+def report(history: ParameterHistory, pooled: Pooled | None, changes: Changes) -> dict[str, Any]:
     """Return the answer of `pooled.pool` and `changes.find_changes` as JSON content; NaN stands for unknown.
 
     Parameters
@@ -23,18 +23,18 @@ def report(history: ParameterHistory, pooled: Pooled | None, found: Changes) -> 
     pooled : Pooled or None
         None where there is no set.
     """
-    settings = found.settings
+    settings = changes.settings
     return {
         "sets": len(history),
-        "occasions": [instant(int(t)) for t in found.occasion_utc_ns],
+        "occasions": [instant(int(t)) for t in changes.occasion_utc_ns],
         "pooled": None if pooled is None else _pooled(history, pooled, settings.level),
-        "verdict": found.verdict,
-        "why": found.why,
-        "p_value": found.p_value,
+        "verdict": changes.verdict,
+        "why": changes.why,
+        "p_value": changes.p_value,
         "level": settings.level,
-        "changes": [_change(history, change, settings.level) for change in found.changes],
-        "scatter_between_trials": _sizes(history, found.scatter, found.mean),
-        "smallest_step_seen": {"power": settings.power, **_sizes(history, found.smallest, found.mean)},
+        "changes": [_change(history, change, settings.level) for change in changes.changes],
+        "scatter_between_trials": _sizes(history, changes.scatter, changes.mean),
+        "smallest_step_seen": {"power": settings.power, **_sizes(history, changes.smallest, changes.mean)},
     }
 
 

@@ -50,8 +50,8 @@ class Stretch:
         random = np.random.Generator(np.random.PCG64([self.settings.seed, stream, n]))
         normal = random.standard_normal((draws, n, p))
         tails = np.sqrt(self.settings.tail_dof / random.chisquare(self.settings.tail_dof, (draws, n, 1)))
-        found: Float = np.einsum("iab,sib->sia", np.linalg.cholesky(self.total), normal * tails)
-        return found
+        deviations: Float = np.einsum("iab,sib->sia", np.linalg.cholesky(self.total), normal * tails)
+        return deviations
 
 
 def stretch(history: ParameterHistory, settings: ChangeSettings) -> Stretch:
@@ -92,14 +92,14 @@ class Verdict:
     drift_threshold: float
 
 
-def judge(one: Stretch, level: float) -> Verdict:
+def judge(span: Stretch, level: float) -> Verdict:
     """Test a stretch for a step at an unknown time and for a drift, both at once.
 
     The two statistics are put on one scale by their ranks among the simulated histories, and the smaller rank
     probability is itself judged by those histories (min-p: Westfall and Young 1993, Resampling-Based Multiple Testing).
     """
-    simulated = one.statistics(one.noise(one.settings.draws, 0))
-    own = one.statistics(one.value)
+    simulated = span.statistics(span.noise(span.settings.draws, 0))
+    own = span.statistics(span.value)
     step, drift = (
         np.append(many, alone)
         for many, alone in (
@@ -109,9 +109,9 @@ def judge(one: Stretch, level: float) -> Verdict:
     )
     size = step.size
     smaller = np.minimum(_tail(step), _tail(drift))
-    p_value = min(1.0, float(np.mean(smaller <= smaller[-1])) / one.settings.caution)
+    p_value = min(1.0, float(np.mean(smaller <= smaller[-1])) / span.settings.caution)
     # the rank that so many simulated histories reach by one of the two
-    allowed = np.sort(smaller[:-1])[max(int(level * one.settings.caution * size) - 1, 0)]
+    allowed = np.sort(smaller[:-1])[max(int(level * span.settings.caution * size) - 1, 0)]
     place = min(max(round(allowed * size), 1), size - 1)
     return Verdict(p_value, float(np.sort(step[:-1])[-place]), float(np.sort(drift[:-1])[-place]))
 

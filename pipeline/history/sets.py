@@ -35,11 +35,11 @@ class ParameterHistory:
 
     def __post_init__(self) -> None:
         n, p = self.time_utc_ns.size, len(self.names)
-        found = (self.value.shape, self.covariance.shape, len(self.units))
-        if found != ((n, p), (n, p, p), p):
+        shapes = (self.value.shape, self.covariance.shape, len(self.units))
+        if shapes != ((n, p), (n, p, p), p):
             raise DataRejected(
                 "history_shape",
-                f"{n} instants and {p} names come with values, covariances and units of shape {found}.",
+                f"{n} instants and {p} names come with values, covariances and units of shape {shapes}.",
                 "Give one value and one covariance a set, one unit a parameter.",
             )
         if bool(np.any(np.diff(self.time_utc_ns) < 0)):

@@ -175,8 +175,8 @@ def _untrimmed(lines: Spans, separator: str | None) -> Spans:
 
 def _as_utf8(data: bytes, encoding: str) -> bytes:
     try:
-        known = codecs.lookup(encoding).name
-        if known != "utf-8":
+        codec = codecs.lookup(encoding).name
+        if codec != "utf-8":
             data = data.decode(encoding, errors="replace").encode("utf-8")
     except (LookupError, TypeError, ValueError) as error:
         raise UsageError(

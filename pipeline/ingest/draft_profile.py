@@ -83,11 +83,11 @@ def draft_topics(file_name: str, topics: Mapping[str, Fields]) -> str:
     """
     lines = [*_head(file_name, "topics"), "    channels:  # '<topic>.<field>'; the time is that at which it was logged"]
     for topic, fields in topics.items():
-        for field, known in fields.items():
-            if known is not None:
-                more = ", positive: port" if known.positive == "port" else ""
-                more += f", offset: {known.offset:.6g}" if known.offset else ""
-                lines.append(_entry(f"{topic}.{field}", known.channel, known.unit, more))
+        for field, mapped in fields.items():
+            if mapped is not None:
+                more = ", positive: port" if mapped.positive == "port" else ""
+                more += f", offset: {mapped.offset:.6g}" if mapped.offset else ""
+                lines.append(_entry(f"{topic}.{field}", mapped.channel, mapped.unit, more))
                 continue
             name, unit = _words(field.rpartition(".")[2])
             last = _words(topic.rpartition("/")[2])[0]
@@ -97,9 +97,9 @@ def draft_topics(file_name: str, topics: Mapping[str, Fields]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _head(file_name: str, what: str) -> list[str]:
+def _head(file_name: str, contents: str) -> list[str]:
     return [
-        f"# A draft from the {what} of {file_name}. Correct every line that has a ? and delete the ?;",
+        f"# A draft from the {contents} of {file_name}. Correct every line that has a ? and delete the ?;",
         "# take out the lines that are not needed. docs/profile.md lists the channels and the units.",
         'vessel: "?"',
         "length_m: null",

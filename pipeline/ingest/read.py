@@ -74,11 +74,11 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         file = LogFile(content)
     source = profile.source_for(name)
     log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
-    known = sniff.no_log(file.read(0, sniff.SAMPLE))
-    if known is not None:
+    kind = sniff.no_log(file.read(0, sniff.SAMPLE))
+    if kind is not None:
         raise DataRejected(
             "unknown_format",
-            f"{name} is {known}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
+            f"{name} is {kind}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
             "Give the log that the logger wrote, or export it as one of these. " + _SEE_PROFILE,
             {"name": name},
         )

@@ -77,8 +77,8 @@ def _read(instruments: Instruments, channel: str, at: Nanoseconds) -> Float:
     series = instruments.get(channel)
     if series is None or len(series) < 2:
         return np.full(at.size, np.nan)
-    found: Float = series.at(at, gap_limit_s(series))
-    return found
+    values: Float = series.at(at, gap_limit_s(series))
+    return values
 
 
 def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
@@ -87,8 +87,8 @@ def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
     if np.isfinite(water).any():
         return water
     away = _read(instruments, "course_over_ground", at) - _read(instruments, "heading", at)
-    found: Float = _read(instruments, "speed_over_ground", at) * np.cos(away)
-    return found
+    speed: Float = _read(instruments, "speed_over_ground", at) * np.cos(away)
+    return speed
 
 
 def _wind(instruments: Instruments, at: Nanoseconds) -> Complex:
@@ -101,5 +101,5 @@ def _wind(instruments: Instruments, at: Nanoseconds) -> Complex:
     over_ground = _read(instruments, "speed_over_ground", at)
     way = over_ground * np.exp(1j * _read(instruments, "course_over_ground", at))
     # over the deck comes the true wind and that of her own way, which comes from ahead
-    found: Complex = speed * np.exp(1j * (angle + _read(instruments, "heading", at))) - way
-    return found
+    wind: Complex = speed * np.exp(1j * (angle + _read(instruments, "heading", at))) - way
+    return wind

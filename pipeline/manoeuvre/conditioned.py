@@ -51,7 +51,7 @@ def conditioned(model: Identified, zigzags: Sequence[OwnZigzag]) -> Identified:
         That the model was fitted to, never one that is to judge it.
     """
     before: Float = np.concatenate([model.hull, model.effects])
-    measured = np.array([value for one in zigzags for value in one.measured.values()])
+    measured = np.array([value for zigzag in zigzags for value in zigzag.measured.values()])
     if measured.size < _FEWEST:
         return model
     start, H = _sailed(zigzags, before), _slopes(zigzags, before, model.covariance)
@@ -90,31 +90,31 @@ def _gain(H: Float, prior: Float, left: float) -> tuple[Float, Float]:
 
 def _levels(off: Float, H: Float, covariance: Float) -> tuple[float, float]:
     """Return how many times wider the errors are and what is left of an overshoot, most likely."""
-    best, found = -np.inf, (1.0, READ_DEG)
+    best, levels = -np.inf, (1.0, READ_DEG)
     for times in _TIMES:
         for left in _LEFT_DEG:
             whole = times**2 * H @ covariance @ H.T + left**2 * np.eye(off.size)
             score = -np.linalg.slogdet(whole)[1] - off @ np.linalg.solve(whole, off)
             if score > best:
-                best, found = score, (float(times), float(left))
-    return found
+                best, levels = score, (float(times), float(left))
+    return levels
 
 
 def _sailed(zigzags: Sequence[OwnZigzag], theta: Float) -> Float:
     """Return the overshoots of ships with these parameters, NaN where one runs away."""
-    found: list[float] = []
-    for one in zigzags:
-        own = one.model
+    overshoots: list[float] = []
+    for zigzag in zigzags:
+        own = zigzag.model
         ship = Ship(own.waters, theta[:6], _within(own, theta)[6:], own.surge_here.best, own.rudder_rate.rad_s)
-        made = one.manoeuvre.sailed(ship)
-        found += [np.nan if made is None else made.figures[name] for name in one.measured]
-    return np.array(found)
+        sailed = zigzag.manoeuvre.sailed(ship)
+        overshoots += [np.nan if sailed is None else sailed.figures[name] for name in zigzag.measured]
+    return np.array(overshoots)
 
 
 def _slopes(zigzags: Sequence[OwnZigzag], theta: Float, covariance: Float) -> Float:
     """Return the derivatives of the overshoots by the parameters, shape (n, 6 + p)."""
     steps = _STEP * np.sqrt(np.diag(covariance))
-    base, H = _sailed(zigzags, theta), np.zeros((sum(len(one.measured) for one in zigzags), theta.size))
+    base, H = _sailed(zigzags, theta), np.zeros((sum(len(zigzag.measured) for zigzag in zigzags), theta.size))
     for k in np.flatnonzero(steps > 0.0):
         moved = theta.copy()
         moved[k] += steps[k]

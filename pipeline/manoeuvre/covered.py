@@ -50,13 +50,17 @@ def covered(runs: Sequence[GridRun], scale_m: float) -> Reach:
     scale_m : float
         See `kempf.pipeline.manoeuvre.ship.Waters`.
     """
-    found = [_of(run, scale_m) for run in runs]
+    reaches = [_of(run, scale_m) for run in runs]
     return Reach(
-        float(np.nanmax([one.drift_rad for one in found])) if any(np.isfinite(o.drift_rad) for o in found) else nan,
-        float(np.nanmax([one.yaw_rate for one in found])) if any(np.isfinite(o.yaw_rate) for o in found) else nan,
-        max(one.rudder_rad for one in found),
-        min(one.slowest_m_s for one in found),
-        max(one.fastest_m_s for one in found),
+        float(np.nanmax([reach.drift_rad for reach in reaches]))
+        if any(np.isfinite(reach.drift_rad) for reach in reaches)
+        else nan,
+        float(np.nanmax([reach.yaw_rate for reach in reaches]))
+        if any(np.isfinite(reach.yaw_rate) for reach in reaches)
+        else nan,
+        max(reach.rudder_rad for reach in reaches),
+        min(reach.slowest_m_s for reach in reaches),
+        max(reach.fastest_m_s for reach in reaches),
     )
 
 
@@ -89,21 +93,21 @@ def _smooth(column: Float, width: int) -> Float | None:
         return None
     at = np.arange(column.size)
     laid = np.pad(np.interp(at, at[known], column[known]), (width // 2, width - 1 - width // 2), mode="edge")
-    found: Float = np.convolve(laid, np.ones(width) / width, mode="valid")
-    return found
+    smooth: Float = np.convolve(laid, np.ones(width) / width, mode="valid")
+    return smooth
 
 
 def beyond(predicted: Reach, logs: Reach) -> tuple[Beyond, ...]:
     """Return in what a prediction goes beyond the logs."""
-    found = []
+    quantities = []
     for quantity, there, here, unit in (
         ("drift", degrees(predicted.drift_rad), degrees(logs.drift_rad), "deg"),
         ("yaw_rate", predicted.yaw_rate, logs.yaw_rate, ""),
         ("rudder", degrees(predicted.rudder_rad), degrees(logs.rudder_rad), "deg"),
     ):
         if not there <= _BESIDE * here:
-            found.append(Beyond(quantity, (0.0, there), (0.0, here), unit))
+            quantities.append(Beyond(quantity, (0.0, there), (0.0, here), unit))
     if predicted.slowest_m_s * _BESIDE < logs.slowest_m_s or predicted.fastest_m_s > _BESIDE * logs.fastest_m_s:
         sailed = (predicted.slowest_m_s, predicted.fastest_m_s)
-        found.append(Beyond("speed", sailed, (logs.slowest_m_s, logs.fastest_m_s), "m/s"))
-    return tuple(found)
+        quantities.append(Beyond("speed", sailed, (logs.slowest_m_s, logs.fastest_m_s), "m/s"))
+    return tuple(quantities)

@@ -48,13 +48,13 @@ def judge(
     speed_m_s : float
         Of the approach.
     """
-    wanted = _criteria(manoeuvre, length_m, speed_m_s)
+    criteria = _criteria(manoeuvre, length_m, speed_m_s)
     short = "" if length_m is None or length_m >= SHORTEST_SHIP_M else _short(length_m)
     return tuple(
         Judged(name, limit, unit, float(np.mean(samples[figure] <= limit)), note or short)
         if limit is not None
         else Judged(name, None, unit, None, "the length of the ship is not known: give it in the profile")
-        for name, figure, limit, unit, note in wanted
+        for name, figure, limit, unit, note in criteria
     )
 
 

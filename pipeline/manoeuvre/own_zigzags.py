@@ -49,18 +49,18 @@ class OwnZigzags:
         """Say it."""
         if self.overshoots < FEWEST:
             return "too few zigzags of her own to hold the intervals against"
-        said = (
+        words = (
             f"her own {self.zigzags} zigzags: {self.inside} of {self.overshoots} first and second overshoots in the "
             f"interval of the errors, {self.rms_deg:.2g} deg rms off"
         )
         if self.before is not None:
-            said = (
-                f"{said}, after the parameters were brought to the fitted ones ({self.before.rms_deg:.2g} deg before)"
+            words = (
+                f"{words}, after the parameters were brought to the fitted ones ({self.before.rms_deg:.2g} deg before)"
             )
         if self.scatter <= 0.0:
-            return said
+            return words
         most = ", the most that is tried" if self.scatter >= MOST else ""
-        return f"{said}; every parameter scatters by {100.0 * self.scatter:.2g} % beside its error for it{most}"
+        return f"{words}; every parameter scatters by {100.0 * self.scatter:.2g} % beside its error for it{most}"
 
 
 def held_against(overshoots: Float, zigzags: int) -> OwnZigzags:

@@ -68,24 +68,24 @@ class Prediction:
     @property
     def sailed(self) -> Sailed:
         """What the ship of the estimates does."""
-        found = self.models[0].sailed
-        assert found is not None
-        return found
+        sailed = self.models[0].sailed
+        assert sailed is not None
+        return sailed
 
     @property
     def drawn(self) -> list[Sailed]:
         """What all ships do."""
-        return [one for model in self.models for one in model.drawn]
+        return [sailed for model in self.models for sailed in model.drawn]
 
     @property
     def no_ships(self) -> int:
         """How many draws are no ships."""
-        return sum(one.no_ships for one in self.models)
+        return sum(model.no_ships for model in self.models)
 
     @property
     def share_unstable(self) -> float:
         """Share of all draws that are unstable on a straight course."""
-        return sum(one.unstable for one in self.models) / (len(self.drawn) + self.no_ships)
+        return sum(model.unstable for model in self.models) / (len(self.drawn) + self.no_ships)
 
 
 def predict(
@@ -119,42 +119,42 @@ def predict(
     first = every[0].sailed
     if first is None or not every[0].sails:
         raise _no_ship(models[0], manoeuvre, first is None, every[0].no_ships, count)
-    made = tuple(one for one in every if one.sails)
-    samples = _samples(made)
+    sailing = tuple(model for model in every if model.sails)
+    samples = _samples(sailing)
     speed = models[0].waters.approach_m_s
     return Prediction(
         manoeuvre,
-        figures_of(first, made),
-        made,
+        figures_of(first, sailing),
+        sailing,
         beyond(first.reach, logs),
         judge(manoeuvre, samples, length_m, speed),
-        tuple(one.model for one in every if not one.sails),
+        tuple(model.model for model in every if not model.sails),
     )
 
 
 def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Figure]:
     """Return the figures of a ship with the interval of all that were drawn from some models."""
     samples = _samples(models)
-    found = {}
+    figures = {}
     for name, values in samples.items():
         there = values[np.isfinite(values)]
         value = sailed.figures[name] if sailed is not None else np.nan
         if there.size < ENOUGH * values.size or not np.isfinite(value):
-            found[name] = Figure(None, None, None)
+            figures[name] = Figure(None, None, None)
         else:
             low, high = np.percentile(there, [_TAIL, 100.0 - _TAIL])
-            found[name] = Figure(float(value), float(low), float(high))
-    return found
+            figures[name] = Figure(float(value), float(low), float(high))
+    return figures
 
 
 def _samples(models: Sequence[OfModel]) -> dict[str, Float]:
-    drawn = [one for model in models for one in model.drawn]
-    return {name: np.array([one.figures[name] for one in drawn]) for name in (drawn[0].figures if drawn else ())}
+    drawn = [sailed for model in models for sailed in model.drawn]
+    return {name: np.array([sailed.figures[name] for sailed in drawn]) for name in (drawn[0].figures if drawn else ())}
 
 
 def _of_model(model: Identified, manoeuvre: Manoeuvre, count: int) -> OfModel:
     ships = list(model.ships(count))
-    drawn = tuple(one for one in map(manoeuvre.sailed, ships) if one is not None)
+    drawn = tuple(sailed for sailed in map(manoeuvre.sailed, ships) if sailed is not None)
     unstable = sum(ship.unstable for ship in ships)
     return OfModel(model, manoeuvre.sailed(model.ship), drawn, count - len(drawn), unstable)
 

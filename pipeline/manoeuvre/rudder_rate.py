@@ -43,18 +43,18 @@ def rudder_rate(records: Sequence[Record]) -> RudderRate:
     records : sequence of Record
         Manoeuvres with the rudder as it was read.
     """
-    seen: list[float] = []
+    rates: list[float] = []
     floor = 0.0
     for record in records:
         for rate, steps in _ways_over(record.time_s, record.rudder_rad, record.rudder_period_s):
             if steps >= _STEPS:
-                seen.append(rate)
+                rates.append(rate)
             else:
                 floor = max(floor, rate)
-    if seen:
-        middle = float(np.median(seen))
-        spread = 1.4826 * float(np.median(np.abs(np.array(seen) - middle))) / np.sqrt(len(seen))
-        return RudderRate(middle, max(spread, _LEAST * middle), len(seen), "")
+    if rates:
+        middle = float(np.median(rates))
+        spread = 1.4826 * float(np.median(np.abs(np.array(rates) - middle))) / np.sqrt(len(rates))
+        return RudderRate(middle, max(spread, _LEAST * middle), len(rates), "")
     taken = max(SOLAS_RAD_S, floor)
     why = "as SOLAS asks for" if taken == SOLAS_RAD_S else "the least that the readings allow"
     remark = f"the logs do not show how fast the rudder goes over: {degrees(taken):.2g} deg/s taken, {why}"
@@ -68,15 +68,15 @@ def _ways_over(time_s: Float, rudder_rad: Float, period_s: float) -> list[tuple[
         return []
     level = _INNER * largest
     side = np.where(rudder_rad >= level, 1, np.where(rudder_rad <= -level, -1, 0))
-    found = []
+    ways = []
     there = np.flatnonzero(side)
     for i, j in pairwise(there.tolist()):
         if side[i] != side[j]:
             left = _crossing(time_s, rudder_rad, i, side[i] * level)
             arrived = _crossing(time_s, rudder_rad, j - 1, side[j] * level)
             if arrived > left:
-                found.append((2.0 * level / (arrived - left), (arrived - left) / max(period_s, 1e-9)))
-    return found
+                ways.append((2.0 * level / (arrived - left), (arrived - left) / max(period_s, 1e-9)))
+    return ways
 
 
 def _crossing(time_s: Float, rudder_rad: Float, i: int, level: float) -> float:

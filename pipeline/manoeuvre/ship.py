@@ -144,16 +144,18 @@ class Ship:
 
     def _balance(self, given: float, start: Float | None, *, rate_given: bool) -> Balance | None:
         z = np.zeros(2 + self.waters.model.extra) if start is None else start.copy()
-        forward, found = motion.balanced(*self._shared(), float(given), rate_given, z)
-        if not found:
+        forward, converged = motion.balanced(*self._shared(), float(given), rate_given, z)
+        if not converged:
             return None
         rate, rudder = (given, float(z[1])) if rate_given else (float(z[1]), given)
         return Balance(rate, rudder, float(z[0]), float(forward), z)
 
     def _gear(self) -> tuple[NDArray[np.int64], Float]:
         parts = zip(self.waters.model.effects, self.waters.model.split(self.effects), strict=True)
-        found = [(KINDS[one.rudder_course], float(own[0])) for one, own in parts if one.rudder_course is not None]
-        return np.array([kind for kind, _ in found], dtype=np.int64), np.array([size for _, size in found])
+        gear = [
+            (KINDS[effect.rudder_course], float(own[0])) for effect, own in parts if effect.rudder_course is not None
+        ]
+        return np.array([kind for kind, _ in gear], dtype=np.int64), np.array([size for _, size in gear])
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,5 +185,5 @@ class Track:
 
     def column(self, which: int) -> Float:
         """Return a column, shape (n,)."""
-        found: Float = self.rows[:, which]
-        return found
+        values: Float = self.rows[:, which]
+        return values

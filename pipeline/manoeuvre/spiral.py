@@ -67,24 +67,24 @@ class Spiral:
         """Rudder angles of the direct spiral, from starboard to port."""
         steps = round(self.rudder_rad / self.step_rad)
         angles = np.unique([*(self.step_rad * np.arange(steps)), self.rudder_rad])
-        found: Float = np.concatenate([angles[::-1], -angles[1:]])
-        return found
+        orders: Float = np.concatenate([angles[::-1], -angles[1:]])
+        return orders
 
     def _arm(self, ship: Ship, side: int) -> list[Balance] | None:
         """Return the curve to one side up to the outermost rudder, None where it does not come to it."""
         own = ship.waters.own_time_s
-        found: list[Balance] = []
+        arm: list[Balance] = []
         start = None
         step = _FASTEST / own / _STEPS
         rate = step
         while rate < _FASTEST / own:
-            one = ship.rudder_for(side * rate, start)
-            if one is None or (found and not np.isfinite(one.rudder_rad)):
+            balance = ship.rudder_for(side * rate, start)
+            if balance is None or (arm and not np.isfinite(balance.rudder_rad)):
                 return None
-            found.append(one)
-            start = one.solution
-            if side * one.rudder_rad >= self.rudder_rad:
-                return found
+            arm.append(balance)
+            start = balance.solution
+            if side * balance.rudder_rad >= self.rudder_rad:
+                return arm
             rate += step
         return None
 

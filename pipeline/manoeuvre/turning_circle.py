@@ -52,9 +52,9 @@ class TurningCircle:
             return None
         r = track.rows
         forward, lateral = r[:, motion.FORWARD], r[:, motion.LATERAL]
-        found = turning_figures(
+        figures = turning_figures(
             *(r[:, motion.TIME], r[:, motion.NORTH], r[:, motion.EAST], r[:, motion.HEADING]),
             *(np.hypot(forward, lateral), np.arctan2(-lateral, forward), 0.0),
         )
         curve = thinned(np.column_stack([r[:, motion.NORTH], self.side * r[:, motion.EAST]]))
-        return Sailed({name: getattr(found, name) for name in FIGURES}, curve, reach_of(track, ship.waters.length_m))
+        return Sailed({name: getattr(figures, name) for name in FIGURES}, curve, reach_of(track, ship.waters.length_m))

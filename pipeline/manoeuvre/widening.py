@@ -45,7 +45,9 @@ def widening(
     free = np.flatnonzero(std > 0.0)
     if free.size == 0:
         return 1.0
-    legs = np.concatenate([_scores(*one, hull, values, _STEP * std, free) for one in zip(filters, levels, strict=True)])
+    legs = np.concatenate(
+        [_scores(*pair, hull, values, _STEP * std, free) for pair in zip(filters, levels, strict=True)]
+    )
     if len(legs) < _FEWEST:
         return 1.0
     meat = legs.T @ legs * len(legs) / (len(legs) - 1.0)
@@ -53,25 +55,25 @@ def widening(
     return float(np.sqrt(max(mean, 1.0))) if np.isfinite(mean) else 1.0
 
 
-def _scores(one: RunFilter, levels: Float, hull: Float, values: Float, steps: Float, free: np.ndarray) -> Float:
+def _scores(run_filter: RunFilter, levels: Float, hull: Float, values: Float, steps: Float, free: np.ndarray) -> Float:
     """Return the derivative of every leg's log-likelihood by the free parameters, shape (legs, free)."""
     theta = np.concatenate([hull, values])
     moved = np.repeat(theta[:, None], 2 * free.size, axis=1)
     for k, parameter in enumerate(free):
         moved[parameter, 2 * k] += steps[parameter]
         moved[parameter, 2 * k + 1] -= steps[parameter]
-    passes = one.run_filters(moved[:6], np.repeat(levels[:, None], 2 * free.size, axis=1), moved[6:])
+    passes = run_filter.run_filters(moved[:6], np.repeat(levels[:, None], 2 * free.size, axis=1), moved[6:])
     at = np.column_stack([_log_likelihoods(passed) for passed in passes])
     slopes = (at[:, 0::2] - at[:, 1::2]) / (2.0 * steps[free])
-    leg = _legs(one.run.rudder_rad)
-    found: Float = np.stack([slopes[leg == k].sum(axis=0) for k in range(int(leg[-1]) + 1)])
-    return found
+    leg = _legs(run_filter.run.rudder_rad)
+    scores: Float = np.stack([slopes[leg == k].sum(axis=0) for k in range(int(leg[-1]) + 1)])
+    return scores
 
 
 def _log_likelihoods(passed: Passed) -> Float:
     """Return what every instant adds to the log-likelihood, but for constants, shape (n,)."""
-    found: Float = -0.5 * np.nansum(np.log(passed.variance) + passed.innovation**2 / passed.variance, axis=1)
-    return found
+    terms: Float = -0.5 * np.nansum(np.log(passed.variance) + passed.innovation**2 / passed.variance, axis=1)
+    return terms
 
 
 def _legs(rudder_rad: Float) -> np.ndarray:

@@ -172,7 +172,7 @@ class EffectModel:
             slot, first = slot + len(effect.states), first + len(effect.parameters)
         moving = _moving([target for target, *_ in programs], codes, dynamics.N_BEFORE + self.extra)
         ends = np.cumsum([0, *(len(states) for states in moving)]).tolist()
-        rows = [(*one, *places) for one, places in zip(programs, pairwise(ends), strict=True)]
+        rows = [(*entry, *places) for entry, places in zip(programs, pairwise(ends), strict=True)]
         return (
             np.array(rows, dtype=np.int64).reshape(-1, 5),
             np.concatenate([*codes, np.zeros((0, 2), dtype=np.int64)]),
@@ -219,13 +219,13 @@ class EffectModel:
         own, of = np.unique(values, axis=1, return_inverse=True)
         step, known = time_s[1] - time_s[0], np.concatenate([before, rudder_rad])
         time = time_s[0] + step * (np.arange(known.size) - before.size)
-        courses = [self.rudder(time, known, one)[before.size :] for one in own.T]
+        courses = [self.rudder(time, known, column)[before.size :] for column in own.T]
         return np.ascontiguousarray((np.stack(courses, axis=-1) + between[:, None])[:, of])
 
 
 def _moving(targets: Sequence[int], codes: Sequence[NDArray[np.int64]], width: int) -> list[list[int]]:
     """Return the states that each program moves with: by itself, or as the speed and the rudder that it asks for do."""
-    asked = [{int(index) for what, index in code if what == VARIABLE} for code in codes]
+    asked = [{int(index) for operation, index in code if operation == VARIABLE} for code in codes]
     own = [{i for i in variables if i < width} for variables in asked]
     of_speed, of_rudder = set[int](), set[int]()
     for target, states in zip(targets, own, strict=True):

@@ -39,8 +39,8 @@ def information(filtered: RunFilter, point: Point) -> Float:
     J = np.column_stack(columns)
     whole, shared = J.T @ J, N_HULL + point.values.size
     across, levels = whole[:shared, shared:], whole[shared:, shared:]
-    found: Float = whole[:shared, :shared] - across @ inverse(levels) @ across.T
-    return found
+    complement: Float = whole[:shared, :shared] - across @ inverse(levels) @ across.T
+    return complement
 
 
 def narrowed(known: Known, information_of_run: Float, times: int = 1) -> Float:

@@ -40,8 +40,8 @@ class FreeRun:
     def rms(self) -> Float:
         """Root mean square error by channel, shape (3,), NaN where not measured."""
         with np.errstate(invalid="ignore"):
-            found: Float = np.sqrt(np.nansum(self.error**2, axis=0) / np.sum(np.isfinite(self.error), axis=0))
-        return found
+            rms: Float = np.sqrt(np.nansum(self.error**2, axis=0) / np.sum(np.isfinite(self.error), axis=0))
+        return rms
 
     @property
     def relative(self) -> Float:
@@ -85,8 +85,8 @@ def free_run_of(filtered: RunFilter, hull: Float, values: Float) -> FreeRun:
 
     def errors(starts: Float) -> Float:
         predicted = filtered.free_from(hull, values, starts)
-        found: Float = ((run.measured[..., None] - predicted) * weight[..., None])[made]
-        return found
+        weighted: Float = ((run.measured[..., None] - predicted) * weight[..., None])[made]
+        return weighted
 
     constants, base = start.copy(), errors(start[:, None])[:, 0]
     if not np.all(np.isfinite(base)):

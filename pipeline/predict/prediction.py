@@ -57,21 +57,21 @@ class Predicted:
 
     def inside_95(self) -> dict[str, tuple[int, int]]:
         """Return how many measurements lie in their 95 % interval, and of how many; none in a free run."""
-        found = {}
+        counts = {}
         for i, name in enumerate(CHANNELS):
             good = np.isfinite(self.error[:, i]) & np.isfinite(self.std[:, i])
             if good.any():
                 within = np.abs(self.error[good, i]) < WIDTH_95 * self.std[good, i]
-                found[name] = (int(np.count_nonzero(within)), int(np.count_nonzero(good)))
-        return found
+                counts[name] = (int(np.count_nonzero(within)), int(np.count_nonzero(good)))
+        return counts
 
     def _channels(self) -> list[tuple[str, Float, Float]]:
-        found = []
+        channels = []
         for i, name in enumerate(CHANNELS):
             good = np.isfinite(self.error[:, i])
             if np.count_nonzero(good) > 1:
-                found.append((name, self.error[good, i] + self.predicted[good, i], self.error[good, i]))
-        return found
+                channels.append((name, self.error[good, i] + self.predicted[good, i], self.error[good, i]))
+        return channels
 
 
 def predict(filtered: RunFilter, point: Point, horizon: Horizon) -> Predicted:
@@ -99,12 +99,12 @@ def predict(filtered: RunFilter, point: Point, horizon: Horizon) -> Predicted:
     return Predicted(horizon, filtered.run.time_s, passed.predicted, error, std, settling)
 
 
-def of_free_run(filtered: RunFilter, found: FreeRun, horizon: Horizon) -> Predicted:
+def of_free_run(filtered: RunFilter, free_run: FreeRun, horizon: Horizon) -> Predicted:
     """Return a free run that was made already as a prediction.
 
     Parameters
     ----------
-    found : FreeRun
+    free_run : FreeRun
         Of it.
     horizon : Horizon
         The free one.
@@ -114,10 +114,10 @@ def of_free_run(filtered: RunFilter, found: FreeRun, horizon: Horizon) -> Predic
     DataRejected
         ``prediction_diverges``.
     """
-    if not np.all(np.isfinite(found.predicted)):
+    if not np.all(np.isfinite(free_run.predicted)):
         raise _diverges(filtered)
-    std = np.full(found.error.shape, np.nan)
-    return Predicted(horizon, filtered.run.time_s, found.predicted, found.error, std, 0, found.constants)
+    std = np.full(free_run.error.shape, np.nan)
+    return Predicted(horizon, filtered.run.time_s, free_run.predicted, free_run.error, std, 0, free_run.constants)
 
 
 def settled(passed: Passed) -> tuple[Float, Float]:

@@ -97,12 +97,12 @@ def samples_of(looked: Sequence[Looked]) -> Samples:
     looked : sequence of Looked
         At least one.
     """
-    runs = [one.filtered.run for one in looked]
-    predicted = np.concatenate([one.passed.predicted for one in looked])
+    runs = [look.filtered.run for look in looked]
+    predicted = np.concatenate([look.passed.predicted for look in looked])
     return Samples(
-        whitened=np.concatenate([one.whitened for one in looked]),
-        free_error=np.concatenate([one.free.error for one in looked]),
-        phase=np.concatenate([one.phase_of for one in looked]),
+        whitened=np.concatenate([look.whitened for look in looked]),
+        free_error=np.concatenate([look.free.error for look in looked]),
+        phase=np.concatenate([look.phase_of for look in looked]),
         run=np.concatenate([np.full(run.measured.shape[0], run.name) for run in runs]),
         lateral_speed_m_s=predicted[:, 0],
         yaw_rate_rad_s=predicted[:, 1],

@@ -35,12 +35,14 @@ def smoothed_states(filtered: RunFilter, point: Point, free: FreeRun) -> Float:
     if not np.all(np.isfinite(free.predicted)):
         # no free run to depart from
         return np.full((run.measured.shape[0], 4), np.nan)
-    found = smooth(_departures(filtered, point, free.error)).mean
+    departures = smooth(_departures(filtered, point, free.error)).mean
     force, moment = free.constants[_F], free.constants[_M]
     # the free run's lateral speed and yaw rate would be measured through current and bias
     drift = free.predicted[:, 0] - run.current_row @ free.constants[[_C1, _C2]]
     turn = free.predicted[:, 1] - free.constants[_B]
-    return np.column_stack([drift + found[:, _V], turn + found[:, _R], force + found[:, _F], moment + found[:, _M]])
+    return np.column_stack(
+        [drift + departures[:, _V], turn + departures[:, _R], force + departures[:, _F], moment + departures[:, _M]]
+    )
 
 
 def _departures(filtered: RunFilter, point: Point, error: Float) -> LinearSystem:
@@ -75,7 +77,7 @@ def _sampled(A: Float, W: Float, step_s: float) -> tuple[Float, Float]:
     n, size = A.shape[0], A.shape[1]
     block = np.zeros((n, 2 * size, 2 * size))
     block[:, :size, :size], block[:, :size, size:], block[:, size:, size:] = -A, W, A.transpose(0, 2, 1)
-    found = expm(step_s * block)
-    Phi = found[:, size:, size:].transpose(0, 2, 1)
-    Q = Phi @ found[:, :size, size:]
+    exponential = expm(step_s * block)
+    Phi = exponential[:, size:, size:].transpose(0, 2, 1)
+    Q = Phi @ exponential[:, :size, size:]
     return Phi, 0.5 * (Q + Q.transpose(0, 2, 1))

@@ -45,7 +45,7 @@ def zigzag_between(heading: Series, rudder: Series, speed: Series | None, start_
         signals = Signals.of(*inside)
         for legs in find_chains(signals.rudder_s, signals.rudder, _SAID):
             chain, window_s = measure(signals, legs, _SAID)
-            candidates += [(signals, chain, one, window_s) for one in zigzags_in(chain, _SAID)]
+            candidates += [(signals, chain, candidate, window_s) for candidate in zigzags_in(chain, _SAID)]
     if not candidates:
         raise DataRejected(
             "no_legs",

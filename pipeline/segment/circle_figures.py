@@ -96,7 +96,7 @@ def circle_figures(
     agreed = drift is not None and drift.seen and is_current(drift, track, begin)
     freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
     corrected = freed if agreed else track
-    over_ground, less_drift, made = (turning_figures(*_columns(one), begin) for one in (track, freed, corrected))
+    over_ground, less_drift, circle = (turning_figures(*_columns(path), begin) for path in (track, freed, corrected))
     if through_water:
         reasons.append("The track is made of the water log's speed along the heading: the drift angle is left out.")
     elif source != "heading alone" and drift is None:
@@ -116,16 +116,16 @@ def circle_figures(
             )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
-    spread = _steady_spread(corrected, begin, course, made)
+    spread = _steady_spread(corrected, begin, course, circle)
     uncertain = 0.0 if drift is None or (drift.seen and not agreed) else drift.std_m_s
     nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
     figures: dict[str, Figure] = {}
-    values = asdict(made)
+    values = asdict(circle)
     for name in _FROM_EXECUTE:
         figures[name] = _from_execute(name, values[name], nudged, track, execute_s)
     short = "the heading changed by less than a whole turn"
     for name in _STEADY:
-        missing = "not recorded" if abs(made.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
+        missing = "not recorded" if abs(circle.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
         figures[name] = Figure.of(values[name], spread[name], missing)
     if not np.isfinite(course_std_rad):
         figures["speed_loss_percent"] = Figure.of(nan, nan, "the approach was not steady or is not recorded")
@@ -193,14 +193,14 @@ def _from_execute(
     return Figure.of(value, float(np.sqrt(variance)), "not reached")
 
 
-def _steady_spread(track: TurnTrack, execute_s: float, course: float, made: TurningFigures) -> dict[str, float]:
+def _steady_spread(track: TurnTrack, execute_s: float, course: float, figures: TurningFigures) -> dict[str, float]:
     """Return the standard errors of what is steady, by name, from its values in four parts of the steady turn."""
     parts = _parts(track, execute_s, course)
     if parts is None:
         return dict.fromkeys(_STEADY, nan)
     rate, speed, drift = parts.T
     approach = track.speed_m_s[track.time_s <= execute_s]
-    share = 1.0 - made.speed_loss_percent / 100.0
+    share = 1.0 - figures.speed_loss_percent / 100.0
     moving = bool(np.mean(speed) > 0 and np.mean(approach) > 0)
     loss = np.hypot(_error(speed) / np.mean(speed), np.std(approach) / np.mean(approach)) if moving else nan
     return {
@@ -261,5 +261,5 @@ def _trend_percent(time_s: Float, speed: Float) -> float:
     return 100.0 * slope * float(time_s[-1] - time_s[0]) / float(np.mean(speed))
 
 
-def _named(made: TurningFigures) -> dict[str, float | None]:
-    return {name: value if np.isfinite(value) else None for name, value in asdict(made).items()}
+def _named(figures: TurningFigures) -> dict[str, float | None]:
+    return {name: value if np.isfinite(value) else None for name, value in asdict(figures).items()}

@@ -63,29 +63,35 @@ def standing(corrections: Sequence[Correction]) -> tuple[Standing, ...]:
     corrections : sequence of Correction
         Of one log, in the order in which they were said.
     """
-    found: list[Standing] = []
-    for one in corrections:
-        at = next((k for k, known in enumerate(found) if known.subject_utc_ns == one.subject_utc_ns), None)
+    standings: list[Standing] = []
+    for correction in corrections:
+        at = next((k for k, known in enumerate(standings) if known.subject_utc_ns == correction.subject_utc_ns), None)
         if at is None:
-            added = one.bounds_utc_ns if one.action == "add" else None
-            found.append(Standing(one.subject_utc_ns, one.bounds_utc_ns, added, one.action, one.reason))
+            added = correction.bounds_utc_ns if correction.action == "add" else None
+            standings.append(
+                Standing(
+                    correction.subject_utc_ns, correction.bounds_utc_ns, added, correction.action, correction.reason
+                )
+            )
             continue
-        known = found[at]
-        bounds = {"correct": one.bounds_utc_ns, "accept": known.added_utc_ns}.get(one.action, known.bounds_utc_ns)
-        found[at] = replace(known, bounds_utc_ns=bounds, action=one.action, reason=one.reason)
-    return tuple(found)
+        known = standings[at]
+        bounds = {"correct": correction.bounds_utc_ns, "accept": known.added_utc_ns}.get(
+            correction.action, known.bounds_utc_ns
+        )
+        standings[at] = replace(known, bounds_utc_ns=bounds, action=correction.action, reason=correction.reason)
+    return tuple(standings)
 
 
 def applied(
-    found: Sequence[Zigzag], said: Sequence[Standing], between: Callable[[Bounds], Zigzag]
+    zigzags: Sequence[Zigzag], standings: Sequence[Standing], between: Callable[[Bounds], Zigzag]
 ) -> tuple[tuple[Marked, ...], tuple[str, ...]]:
     """Lay what was said over the zigzags that were found.
 
     Parameters
     ----------
-    found : sequence of Zigzag
+    zigzags : sequence of Zigzag
         Those of a log, in order of time.
-    said : sequence of Standing
+    standings : sequence of Standing
         `standing` of its corrections.
     between : callable
         Describes the zigzag between two bounds, `kempf.pipeline.segment.by_hand.zigzag_between`.
@@ -99,21 +105,21 @@ def applied(
         Of bounds given by a person that hold no zigzag, one sentence each: they stop nothing else.
     """
     by_hand, marked, notes = [], [], []
-    for one in said:
-        if one.bounds_utc_ns is None:
+    for statement in standings:
+        if statement.bounds_utc_ns is None:
             continue
         try:
-            marked.append(Marked(between(one.bounds_utc_ns), one))
-            by_hand.append(one)
+            marked.append(Marked(between(statement.bounds_utc_ns), statement))
+            by_hand.append(statement)
         except DataRejected:
-            if one.excluded is None:
+            if statement.excluded is None:
                 notes.append(
-                    f"a zigzag {'added' if one.action == 'add' else 'corrected'} by hand ({one.reason}) is not there: "
-                    "between its bounds the rudder is not held to one side and then to the other"
+                    f"a zigzag {'added' if statement.action == 'add' else 'corrected'} by hand ({statement.reason}) "
+                    "is not there: between its bounds the rudder is not held to one side and then to the other"
                 )
-    for zigzag in found:
+    for zigzag in zigzags:
         bounds = zigzag.start_utc_ns, zigzag.end_utc_ns
-        if any(one.concerns(*bounds) for one in by_hand):
+        if any(statement.concerns(*bounds) for statement in by_hand):
             continue
-        marked.append(Marked(zigzag, next((one for one in said if one.concerns(*bounds)), None)))
-    return tuple(sorted(marked, key=lambda one: (one.zigzag.start_utc_ns, one.zigzag.end_utc_ns))), tuple(notes)
+        marked.append(Marked(zigzag, next((statement for statement in standings if statement.concerns(*bounds)), None)))
+    return tuple(sorted(marked, key=lambda mark: (mark.zigzag.start_utc_ns, mark.zigzag.end_utc_ns))), tuple(notes)

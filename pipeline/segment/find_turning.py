@@ -57,24 +57,26 @@ def find_turning(
     begin_s = max(float(signals.heading_s[0]), float(signals.rudder_s[0]))
     end_s = min(float(signals.heading_s[-1]), float(signals.rudder_s[-1]))
     turns = find_turns(signals.heading_s, signals.heading, _SMALLEST_TURN_RAD)
-    found: list[TurningCircle | PullOut | Spiral] = []
+    manoeuvres: list[TurningCircle | PullOut | Spiral] = []
     pull_outs: list[PullOut] = []
     for start, end in regions(turns, begin_s, end_s):
         first, behind = np.searchsorted(signals.rudder_s, [start, end + 1e-9])
         stretches = held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
         free = [stretch for stretch in stretches if not _in_zigzag(signals, stretch, zigzags)]
         spirals = find_spirals(signals, free, settings)
-        found += spirals
+        manoeuvres += spirals
         left = [s for s in free if not any(spiral.holds(signals.utc_ns(s.start_s)) for spiral in spirals)]
         for k, stretch in enumerate(left):
             circle = turning_circle(signals, instruments, stretch, settings)
             if circle is not None:
-                found.append(circle)
+                manoeuvres.append(circle)
             if k:
                 pulled = pull_out(signals, left[k - 1], stretch, settings)
                 if pulled is not None:
                     pull_outs.append(pulled)
-    return sorted([*found, *paired(pull_outs)], key=lambda one: (one.start_utc_ns, one.end_utc_ns))
+    return sorted(
+        [*manoeuvres, *paired(pull_outs)], key=lambda manoeuvre: (manoeuvre.start_utc_ns, manoeuvre.end_utc_ns)
+    )
 
 
 def _in_zigzag(signals: Signals, stretch: HeldRudder, zigzags: Sequence[Zigzag]) -> bool:

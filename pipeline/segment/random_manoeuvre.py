@@ -109,19 +109,19 @@ def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ())
         return []
     signals = Signals.of(heading, rudder)
     occupied = [_span(signals, *bounds) for bounds in taken]
-    gaps = [gap for one in (heading, rudder) for gap in _gaps(signals, one, gap_limit_s(one))]
+    gaps = [gap for series in (heading, rudder) for gap in _gaps(signals, series, gap_limit_s(series))]
     gaps += _gaps(signals, way, LONGEST_SPEED_GAP_S)
     hindered = [*gaps, *_slow(signals, way), *_astern(signals, instruments)]
     whole = _span(signals, int(way.time_utc_ns[0]), int(way.time_utc_ns[-1]))
-    found = []
+    manoeuvres = []
     for span in _without(whole, [*occupied, *hindered]):
         inside = _held_in(signals, span)
         orders = [after for before, after in pairwise(inside) if _is_order(before.rudder, after.rudder)]
         for part, room in _unpaused(orders, span):
-            one = _described(signals, room, inside, part)
-            if one is not None:
-                found.append(one)
-    return found
+            manoeuvre = _described(signals, room, inside, part)
+            if manoeuvre is not None:
+                manoeuvres.append(manoeuvre)
+    return manoeuvres
 
 
 def _span(signals: Signals, first_utc_ns: int, last_utc_ns: int) -> Span:
@@ -150,28 +150,28 @@ def _unpaused(orders: list[HeldRudder], room: Span) -> list[tuple[list[HeldRudde
     """
     if len(orders) < _FEWEST_ORDERS:
         return []
-    pauses = np.diff([one.start_s for one in orders])
+    pauses = np.diff([order.start_s for order in orders])
     at = [int(k) for k in np.flatnonzero(pauses > _LONGEST_PAUSE * np.median(pauses))]
     if not at:
         return [(orders, room)]
     middles = [0.5 * (orders[k].start_s + orders[k + 1].start_s) for k in at]
     counts, bounds = [0, *(k + 1 for k in at), len(orders)], [room[0], *middles, room[1]]
     parts = zip(pairwise(counts), pairwise(bounds), strict=True)
-    return [one for (first, end), hers in parts for one in _unpaused(orders[first:end], hers)]
+    return [part for (first, end), hers in parts for part in _unpaused(orders[first:end], hers)]
 
 
 def _described(
     signals: Signals, room: Span, inside: Sequence[HeldRudder], orders: Sequence[HeldRudder]
 ) -> RandomManoeuvre | None:
     """Return what is recorded of a manoeuvre; None where she hardly turned, or her rudder mostly lay amidships."""
-    pause = float(np.median(np.diff([one.start_s for one in orders])))
+    pause = float(np.median(np.diff([order.start_s for order in orders])))
     begin = max(room[0], orders[0].start_s - pause)
     end = min(room[1], orders[-1].start_s + pause)
     first, behind = np.searchsorted(signals.heading_s, [begin, end + 1e-9])
     heading = signals.heading[first:behind]
     if heading.size < 2 or float(np.ptp(heading)) < _TURNED_RAD or _busy_share(signals, orders) < _BUSY_SHARE:
         return None
-    hers = [one.rudder for one in inside if begin <= one.end_s and one.start_s <= end]
+    hers = [hold.rudder for hold in inside if begin <= hold.end_s and hold.start_s <= end]
     side = next(rudder for rudder in hers if abs(rudder) >= _ORDER_RAD / 2.0)
     return RandomManoeuvre(
         side="starboard" if side > 0.0 else "port",
@@ -179,7 +179,7 @@ def _described(
         base_heading_deg=float(np.rad2deg(heading[0]) % 360.0),
         start_utc_ns=signals.utc_ns(begin),
         end_utc_ns=signals.utc_ns(end),
-        orders_utc_ns=tuple(signals.utc_ns(one.start_s) for one in orders),
+        orders_utc_ns=tuple(signals.utc_ns(order.start_s) for order in orders),
         heading_range_deg=float(np.rad2deg(np.ptp(heading))),
         gap_s=signals.gap_s(begin, end),
     )
@@ -239,10 +239,10 @@ def _seen(signals: Signals, series: Series, holds: NDArray[np.bool_]) -> list[Sp
     return [(float(begin), float(end)) for begin, end in zip(begins, ends, strict=True)]
 
 
-def _without(whole: Span, taken: Sequence[Span]) -> list[Span]:
+def _without(whole: Span, spans: Sequence[Span]) -> list[Span]:
     """Return what is left of a stretch of time without others."""
     left, begin = [], whole[0]
-    for first, last in sorted(taken):
+    for first, last in sorted(spans):
         if first > begin:
             left.append((begin, min(first, whole[1])))
         begin = max(begin, last)

@@ -109,7 +109,7 @@ def find_spirals(signals: Signals, stretches: Sequence[HeldRudder], settings: Se
     IMO MSC/Circ.1053, spiral manoeuvres; ITTC 7.5-04-02-01; ISO 13643-3.
     """
     smallest = float(np.deg2rad(settings.smallest_rudder_deg))
-    found = []
+    spirals = []
     for chain in _chains(signals, stretches):
         ways = [way for way in _ways(chain) if _from_side_to_side(chain, way, smallest)]
         groups: list[list[tuple[int, int]]] = []
@@ -118,8 +118,8 @@ def find_spirals(signals: Signals, stretches: Sequence[HeldRudder], settings: Se
                 groups[-1].append(way)
             else:
                 groups.append([way])
-        found += [spiral for group in groups if (spiral := _described(signals, chain, group)) is not None]
-    return found
+        spirals += [spiral for group in groups if (spiral := _described(signals, chain, group)) is not None]
+    return spirals
 
 
 def _chains(signals: Signals, stretches: Sequence[HeldRudder]) -> list[list[HeldRudder]]:

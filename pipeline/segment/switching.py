@@ -82,16 +82,16 @@ def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
     list of Switching
         In order of time, without common legs.
     """
-    found: list[Switching] = []
+    zigzags: list[Switching] = []
     for look_for in (_from_steady, _of_many_switchings, _from_turning):
-        borders = [-1, *(k for s in found for k in (s.first, s.last)), len(chain.legs)]
-        found += [
+        borders = [-1, *(k for s in zigzags for k in (s.first, s.last)), len(chain.legs)]
+        zigzags += [
             zigzag
             for begin, end in zip(borders[::2], borders[1::2], strict=True)
             for zigzag in _scan(chain, begin + 1, end - 1, settings, look_for)
         ]
-        found.sort(key=lambda s: s.first)
-    return found
+        zigzags.sort(key=lambda s: s.first)
+    return zigzags
 
 
 def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, look_for: _Rule) -> list[Switching]:
@@ -181,8 +181,8 @@ def _start(chain: Chain, first: int, settings: SegmentSettings, *, centre: float
     slack = float(np.deg2rad(settings.switching_slack_deg))
     if abs(away + leg.side * change) <= max(settings.switching_scatter * change, slack):
         return "switching"
-    other = chain.legs[first + 1]
-    offset, amplitude = (leg.rudder + other.rudder) / 2, abs(leg.rudder - other.rudder) / 2
+    next_leg = chain.legs[first + 1]
+    offset, amplitude = (leg.rudder + next_leg.rudder) / 2, abs(leg.rudder - next_leg.rudder) / 2
     if not _one_rate([ramp, *chain.ramps[first + 1 : first + 3]], settings):
         return "unknown"
     # a helmsman starts from a steady course with the rudder about amidships

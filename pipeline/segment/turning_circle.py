@@ -235,13 +235,13 @@ def _start(
 
 
 def _reasons(start: Start, ramp: Ramp | None, measured: CircleFigures, gap_s: float) -> tuple[str, ...]:
-    said = {
+    sentences = {
         "turning": "The ship was turning at the execute: the approach was not steady.",
         "unknown": "The approach is not recorded: the figures are referred to the heading at the execute."
         if ramp is not None
         else "The log begins with the rudder over: what is measured from the execute is not known.",
     }
-    shown = [said[start]] if start in said else []
+    shown = [sentences[start]] if start in sentences else []
     trend = measured.approach_speed_trend_percent
     if abs(trend) > _SPEED_TREND_PERCENT:
         shown.append(f"The speed changed by {trend:.0f} % over the approach.")

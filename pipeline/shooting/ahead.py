@@ -55,8 +55,8 @@ class Ahead:
         """
         if self.one_step is None:
             return None
-        found = paired(self.one_step, self.own)
-        return found if found.in_std > _DISAGREE and found.falls_by > _LEAST else None
+        comparison = paired(self.one_step, self.own)
+        return comparison if comparison.in_std > _DISAGREE and comparison.falls_by > _LEAST else None
 
     @property
     def model(self) -> EffectModel:
@@ -81,12 +81,12 @@ class Ahead:
         errors : LeftOut
             One of those of this model.
         """
-        found = []
-        for one in errors.errors:
-            known = np.flatnonzero(~np.isnan(one).all(axis=0))
-            mean = np.sqrt(np.nanmean(one[:, known], axis=0))
-            found.append(100.0 * float(np.mean(mean * self.fit.scales.error[known] / self.motion[known])))
-        return np.array(found)
+        percents = []
+        for error in errors.errors:
+            known = np.flatnonzero(~np.isnan(error).all(axis=0))
+            mean = np.sqrt(np.nanmean(error[:, known], axis=0))
+            percents.append(100.0 * float(np.mean(mean * self.fit.scales.error[known] / self.motion[known])))
+        return np.array(percents)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,25 +114,27 @@ class ShootingRange:
         """Let a fitted model predict what it has not seen."""
         model = fit.shots[0].model
         shots = [ShotRun(windows, model, self.spec) for windows in self.held]
-        made = list(self.workers.map(lambda shot: alone(shot, fit.shared, self.scales), shots))
-        held = LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made))
+        predictions = list(self.workers.map(lambda shot: alone(shot, fit.shared, self.scales), shots))
+        held = LeftOut(np.array([m for m, _, _ in predictions]), tuple(e for _, _, e in predictions))
         return Ahead(fit, left_out(fit, self.workers), held, self.held, self.motion, self.horizon_s)
 
     def beside(self, ahead: Ahead, fit: PooledFit) -> Ahead:
         """Return a model with how the likelihood's parameters of it predict legs, nothing shared being fitted."""
         shared = fit.ship.parameters
         pairs = [(shot, part.at) for shot, part in zip(ahead.fit.shots, ahead.fit.parts, strict=True)]
-        made = list(self.workers.map(lambda pair: alone(pair[0], shared, self.scales, pair[1]), pairs))
-        return replace(ahead, one_step=LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made)))
+        predictions = list(self.workers.map(lambda pair: alone(pair[0], shared, self.scales, pair[1]), pairs))
+        return replace(
+            ahead, one_step=LeftOut(np.array([m for m, _, _ in predictions]), tuple(e for _, _, e in predictions))
+        )
 
     def with_effect(self, base: Ahead, effect: Effect) -> Ahead | None:
         """Fit a model with one effect more; None where it runs away at every size that is tried."""
         model = base.model.with_effect(effect)
         tried = []
         for size in _sizes(effect):
-            made = self._begun(model, base, size)
-            if made is not None:
-                tried.append((made[0], made[1]))
+            start = self._begun(model, base, size)
+            if start is not None:
+                tried.append((start[0], start[1]))
         if not tried:
             return None
         _, shared = min(tried, key=lambda pair: pair[0])
@@ -169,16 +171,16 @@ class ShootingRange:
 
         What only noise drives, as waves, moves no window, and is left out.
         """
-        found, without = [], self._moved(base)
+        ranking, without = [], self._moved(base)
         for effect in effects:
             if driven_by_noise(effect):
                 continue
             model = base.model.with_effect(effect)
             begun = (self._begun(model, base, size, without) for size in _sizes(effect))
-            made = [one for one in begun if one is not None]
-            if made:
-                found.append((min(cost for cost, _ in made), effect))
-        return sorted(found, key=lambda pair: (pair[0], pair[1].name))
+            starts = [start for start in begun if start is not None]
+            if starts:
+                ranking.append((min(cost for cost, _ in starts), effect))
+        return sorted(ranking, key=lambda pair: (pair[0], pair[1].name))
 
     def _begun(
         self, model: EffectModel, base: Ahead, size: Float, without: Sequence[Moved] | None = None
@@ -190,8 +192,8 @@ class ShootingRange:
         shared = np.concatenate([base.fit.shared, size])
         shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
         at = [replace(part.at, shared=shared) for part in base.fit.parts]
-        made = zip(size, model.effects[-1].parameters, strict=True)
-        absent = all(value == p.absent for value, p in made if not p.shapes)
+        pairs = zip(size, model.effects[-1].parameters, strict=True)
+        absent = all(value == p.absent for value, p in pairs if not p.shapes)
         here = shooting_fit.linearised(shots, at, self.scales, self.workers, without if absent else None)
         return None if here is None else (shooting_fit.foreseen(here), shared)
 
@@ -216,8 +218,8 @@ def shooting_range(
     measured = np.isfinite(np.concatenate([run.measured for run in runs])).any(axis=0)
     motion = np.where(measured, motion, np.nan)
     plain = scaled([ShotRun(windows, EffectModel(), spec) for windows in fitted], workers)
-    made = ShootingRange(spec, horizon, fitted, unseen, plain.scales, motion, None, workers)  # type: ignore[arg-type]
-    return replace(made, plain=made.judged(plain))
+    shooting = ShootingRange(spec, horizon, fitted, unseen, plain.scales, motion, None, workers)  # type: ignore[arg-type]
+    return replace(shooting, plain=shooting.judged(plain))
 
 
 def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Executor) -> tuple[Ahead | None, ...]:
@@ -237,17 +239,17 @@ def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Execut
     if len(first.runs) < 2:
         return (None,) * len(fits)
     shooting = shooting_range([filtered.run for filtered in first.runs], held, first.runs[0].spec, workers)
-    made: list[Ahead] = []
+    models: list[Ahead] = []
     for fit in fits:
-        near = made[-1] if made else shooting.plain
+        near = models[-1] if models else shooting.plain
         ship = fit.ship
         if ship.model.effects:
             begun = [shooting.refitted(ship.model, np.concatenate([near.fit.hull, ship.values]), near)]
             if len(ship.model.effects) == len(near.model.effects) + 1:
-                begun += [one for one in [shooting.with_effect(near, ship.model.effects[-1])] if one is not None]
-            near = min(begun, key=lambda one: one.fit.cost)
-        made.append(shooting.beside(near, fit))
-    return tuple(made)
+                begun += [model for model in [shooting.with_effect(near, ship.model.effects[-1])] if model is not None]
+            near = min(begun, key=lambda model: model.fit.cost)
+        models.append(shooting.beside(near, fit))
+    return tuple(models)
 
 
 def _sizes(effect: Effect) -> list[Float]:

@@ -43,10 +43,10 @@ def left_out(fit: ShootingFit, workers: Executor) -> LeftOut:
         # at the optimum of all, the others' gradient is the negative of the one left out
         step = np.linalg.lstsq(rest / np.outer(scale, scale), part.gradient / scale, rcond=1e-12)[0] / scale
         shared = np.clip(fit.shared + step, low, high)
-        found, _, errors = alone(fit.shots[number], shared, fit.scales, part.stepped(shared - fit.shared, 0.0))
-        return found, errors
+        own_misfit, _, errors = alone(fit.shots[number], shared, fit.scales, part.stepped(shared - fit.shared, 0.0))
+        return own_misfit, errors
 
     if len(fit.parts) < 2:
         return LeftOut(np.array([misfit(part.errors) for part in fit.parts]), tuple(p.errors for p in fit.parts))
-    made = list(workers.map(one, range(len(fit.parts))))
-    return LeftOut(np.array([m for m, _ in made]), tuple(e for _, e in made))
+    results = list(workers.map(one, range(len(fit.parts))))
+    return LeftOut(np.array([m for m, _ in results]), tuple(e for _, e in results))

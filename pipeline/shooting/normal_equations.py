@@ -35,8 +35,8 @@ class NormalEquations:
     @property
     def scale(self) -> Float:
         """What makes the information's diagonal one, shape (6 + p,)."""
-        found: Float = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
-        return found
+        scale: Float = np.sqrt(np.maximum(np.diag(self.information), 1e-300))
+        return scale
 
     def of(self, columns: NDArray[np.intp]) -> NormalEquations:
         """Return those of some of the unknowns, the others kept where they are."""

@@ -28,7 +28,7 @@ class Paired:
 
 def paired(first: LeftOut, second: LeftOut) -> Paired:
     """Compare two models of the same manoeuvres."""
-    a, b = (np.concatenate([np.nansum(e, axis=1) for e in one.errors]) for one in (first, second))
+    a, b = (np.concatenate([np.nansum(e, axis=1) for e in model.errors]) for model in (first, second))
     if not np.all(np.isfinite(b)) or not np.all(np.isfinite(a)):
         sign = float(np.all(np.isfinite(b))) - float(np.all(np.isfinite(a)))
         better = int(np.sum(np.nan_to_num(second.misfits, nan=np.inf) < np.nan_to_num(first.misfits, nan=np.inf)))

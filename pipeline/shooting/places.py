@@ -54,7 +54,7 @@ class Places:
     def most(self, *by: str) -> Place | None:
         """Return the place of these cuts that holds most beyond its part of the windows; None where none stands out."""
         there = (place for place in self.places if place.by in by and place.stands_out)
-        return max(there, key=lambda one: one.excess, default=None)
+        return max(there, key=lambda place: place.excess, default=None)
 
 
 def places(windows: Sequence[Windows], errors: Sequence[Float]) -> Places | None:
@@ -74,22 +74,24 @@ def places(windows: Sequence[Windows], errors: Sequence[Float]) -> Places | None
         return None
     columns = np.sum(np.where(made, each, 0.0), axis=0) / np.sum(total)
     channels = [float(part) if made[:, i].any() else float("nan") for i, part in enumerate(columns)]
-    names = [one.run.name for one in windows for _ in one.begins]
+    names = [manoeuvre.run.name for manoeuvre in windows for _ in manoeuvre.begins]
     # the leg in which the middle of a window lies
-    legs = np.concatenate([moved(one.run.rudder_rad)[(one.begins + one.ends) // 2] for one in windows])
+    legs = np.concatenate(
+        [moved(manoeuvre.run.rudder_rad)[(manoeuvre.begins + manoeuvre.ends) // 2] for manoeuvre in windows]
+    )
     cuts = {"manoeuvre": np.array(names), "leg": legs.astype(str)}
-    sizes = np.concatenate([_sizes(one) for one in windows])
+    sizes = np.concatenate([_sizes(manoeuvre) for manoeuvre in windows])
     for column, by in enumerate(("rudder", "yaw_rate", "drift")):
         size = sizes[:, column]
         if np.all(np.isfinite(size)):
             rank = np.argsort(np.argsort(size, kind="stable"), kind="stable")
             cuts[by] = np.array(_PARTS)[rank * len(_PARTS) // size.size]
-    found = [
+    groups = [
         Place(by, str(name), float(np.sum(total[cut == name]) / np.sum(total)), float(np.mean(cut == name)))
         for by, cut in cuts.items()
         for name in dict.fromkeys(cut.tolist())
     ]
-    return Places((channels[0], channels[1], channels[2]), tuple(found))
+    return Places((channels[0], channels[1], channels[2]), tuple(groups))
 
 
 def _sizes(windows: Windows) -> Float:
@@ -97,11 +99,11 @@ def _sizes(windows: Windows) -> Float:
     run = windows.run
     speed = np.maximum(run.inputs[::ROWS, 0], 1e-3 * max(run.approach_m_s, 1e-6))
     courses = np.column_stack([run.rudder_rad, run.measured[:, 1], run.measured[:, 0] / speed])
-    found = np.full((windows.begins.size, 3), np.nan)
+    sizes = np.full((windows.begins.size, 3), np.nan)
     for w, (begin, end) in enumerate(zip(windows.begins, windows.ends, strict=True)):
         part = courses[begin : end + 1]
         made = np.isfinite(part)
         many = np.count_nonzero(made, axis=0)
         squares = np.sum(np.where(made, part, 0.0) ** 2, axis=0)
-        found[w, many > 0] = np.sqrt(squares[many > 0] / many[many > 0])
-    return found
+        sizes[w, many > 0] = np.sqrt(squares[many > 0] / many[many > 0])
+    return sizes

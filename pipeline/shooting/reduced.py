@@ -141,11 +141,11 @@ def _diverged(shot: ShotRun, at: Unknowns) -> Reduced:
 def squares(shot: ShotRun, error: Float) -> Float:
     """Return the mean square error by window and channel, shape (w, 3), NaN where not measured."""
     windows = shot.windows
-    found = np.full((windows.begins.size, 3), np.nan)
+    mean_squares = np.full((windows.begins.size, 3), np.nan)
     made = np.isfinite(windows.measured)
     for i in range(3):
         of = windows.of_row[made[:, i]]
         many = np.bincount(of, minlength=windows.begins.size)
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
-            found[:, i] = np.bincount(of, error[made[:, i], i] ** 2, minlength=windows.begins.size) / many
-    return found
+            mean_squares[:, i] = np.bincount(of, error[made[:, i], i] ** 2, minlength=windows.begins.size) / many
+    return mean_squares

@@ -93,8 +93,8 @@ def repeats(fit: ShootingFit, held: Sequence[Windows], horizon_s: float, workers
 
     every = [(shot.windows, part.at.own) for shot, part in zip(fit.shots, fit.parts, strict=True)]
     every += list(zip(held, workers.map(own, held), strict=True))
-    made = list(workers.map(lambda one: _swept(one[0], one[1], first, fit.shared, fit.scales, horizon_s), every))
-    swept = [one for one in made if one is not None]
+    results = list(workers.map(lambda pair: _swept(pair[0], pair[1], first, fit.shared, fit.scales, horizon_s), every))
+    swept = [result for result in results if result is not None]
     floor = _floor(swept) if swept else np.zeros(_COURSES)
     rows = [
         (float(i), float(j), apart, *_differ(swept[i].left[a], swept[j].left[b]))
@@ -124,13 +124,13 @@ def _swept(
     at = Unknowns(shared, own, np.nan_to_num(dense.start))
     for _ in range(_STEPS):
         at = replace(at, starts=_begun(shot, at, scales))
-    found = shot.predicted(shared[:, None], own[:, None], at.starts[..., None])[..., 0]
-    if not np.all(np.isfinite(found)):
+    predicted = shot.predicted(shared[:, None], own[:, None], at.starts[..., None])[..., 0]
+    if not np.all(np.isfinite(predicted)):
         return None
     shape = (dense.begins.size, length + 1, 3)
-    left = ((dense.measured - found) / scales.error).reshape(shape)
+    left = ((dense.measured - predicted) / scales.error).reshape(shape)
     points = np.round(np.linspace(0, length, _POINTS)).astype(np.int64)
-    rows, motion = dense.begins[:, None] + points, found.reshape(shape)[:, points]
+    rows, motion = dense.begins[:, None] + points, predicted.reshape(shape)[:, points]
     heading = run.heading_rad[rows]
     courses = [run.rudder_rad[rows], motion[..., 0], motion[..., 1], motion[..., 2] - motion[:, :1, 2]]
     courses += [run.speed_m_s[rows], run.inputs[::ROWS, _SHAFT][rows], np.sin(heading), np.cos(heading)]
@@ -144,9 +144,9 @@ def _begun(shot: ShotRun, at: Unknowns, scales: Scales) -> Float:
     starts = np.tile(at.starts[..., None], 4)
     for j in range(3):
         starts[:, j, 1 + j] += by[j]
-    found = shot.predicted(at.shared[:, None].repeat(4, 1), at.own[:, None].repeat(4, 1), starts)
-    slopes = (found[..., 1:] - found[..., :1]) / by
-    error, weight = whitened(shot, found[..., 0], scales)
+    predicted = shot.predicted(at.shared[:, None].repeat(4, 1), at.own[:, None].repeat(4, 1), starts)
+    slopes = (predicted[..., 1:] - predicted[..., :1]) / by
+    error, weight = whitened(shot, predicted[..., 0], scales)
     edges = np.searchsorted(windows.of_row, np.arange(windows.begins.size + 1))
     std = np.maximum(windows.start_std, 1e-3 * scales.error)
     result = at.starts.copy()
@@ -155,7 +155,7 @@ def _begun(shot: ShotRun, at: Unknowns, scales: Scales) -> Float:
         J = (slopes[rows] / scales.error[:, None] * weight[rows][..., None]).reshape(-1, 3)
         e = (error[rows] * weight[rows]).ravel()
         # what is predicted of the first instant against what was measured around it
-        first = ((windows.start[w] - found[edges[w], :, 0]) / std[w])[known]
+        first = ((windows.start[w] - predicted[edges[w], :, 0]) / std[w])[known]
         slope = (slopes[edges[w]] / std[w][:, None])[known]
         J, e = np.concatenate([J, slope]), np.concatenate([e, first])
         if np.all(np.isfinite(J)) and np.all(np.isfinite(e)):
@@ -165,7 +165,7 @@ def _begun(shot: ShotRun, at: Unknowns, scales: Scales) -> Float:
 
 def _floor(swept: Sequence[_Swept]) -> Float:
     """Return the mean squares below which a course counts as that large, shape (8,)."""
-    squares = np.mean(np.concatenate([np.mean(one.courses**2, axis=1) for one in swept]), axis=0)
+    squares = np.mean(np.concatenate([np.mean(manoeuvre.courses**2, axis=1) for manoeuvre in swept]), axis=0)
     result: Float = _LEAST**2 * squares
     return result
 
@@ -175,7 +175,7 @@ def _near(one: _Swept, other: _Swept, floor: Float) -> list[tuple[int, int, floa
 
     Those of the first manoeuvre lie half a window apart, each with the nearest of the other.
     """
-    size, found = np.mean(other.courses**2, axis=1), []
+    size, pairs = np.mean(other.courses**2, axis=1), []
     for a in range(0, one.courses.shape[0], one.half):
         apart = np.mean((other.courses - one.courses[a]) ** 2, axis=1)
         scale = np.maximum(0.5 * (size + np.mean(one.courses[a] ** 2, axis=0)), floor)
@@ -186,8 +186,8 @@ def _near(one: _Swept, other: _Swept, floor: Float) -> list[tuple[int, int, floa
         worst = np.max(part[:, :7], axis=1)
         b = int(np.argmin(worst))
         if worst[b] <= NEAR**2:
-            found.append((a, b, float(worst[b])))
-    return found
+            pairs.append((a, b, float(worst[b])))
+    return pairs
 
 
 def _differ(a: Float, b: Float) -> tuple[float, float]:

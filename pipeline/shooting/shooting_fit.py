@@ -154,8 +154,8 @@ def linearised(
     without : sequence of (ndarray, ndarray), optional
         See `ShotRun.moved`; one a manoeuvre.
     """
-    found = normal_equations(shots, _reduced(shots, at, scales, workers, without))
-    return found if np.isfinite(found.cost) else None
+    equations = normal_equations(shots, _reduced(shots, at, scales, workers, without))
+    return equations if np.isfinite(equations.cost) else None
 
 
 def foreseen(here: NormalEquations) -> float:
@@ -185,8 +185,8 @@ def alone(shot: ShotRun, shared: Float, scales: Scales, begin: Unknowns | None =
         part = trial
         if settled:
             break
-    found = misfit(part.errors)
-    return (found if np.isfinite(part.cost) else float("inf")), part.at, part.errors
+    own_misfit = misfit(part.errors)
+    return (own_misfit if np.isfinite(part.cost) else float("inf")), part.at, part.errors
 
 
 def _reduced(
@@ -196,5 +196,7 @@ def _reduced(
     workers: Executor,
     without: Sequence[Moved] | None = None,
 ) -> list[Reduced]:
-    known: Sequence[Moved | None] = without or [None] * len(shots)
-    return list(workers.map(lambda one: reduce(one[0], one[1], scales, one[2]), zip(shots, at, known, strict=True)))
+    predictions: Sequence[Moved | None] = without or [None] * len(shots)
+    return list(
+        workers.map(lambda job: reduce(job[0], job[1], scales, job[2]), zip(shots, at, predictions, strict=True))
+    )

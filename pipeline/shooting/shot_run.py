@@ -89,8 +89,8 @@ class ShotRun:
             run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
         )
         groups = [np.minimum(np.arange(first, first + MOST), k - 1) for first in range(0, k, MOST)]
-        found = [self._shot(shared[:, at], own[:, at], starts[..., at], rudder[:, at]) for at in groups]
-        return np.concatenate(found, axis=-1)[..., :k]
+        parts = [self._shot(shared[:, at], own[:, at], starts[..., at], rudder[:, at]) for at in groups]
+        return np.concatenate(parts, axis=-1)[..., :k]
 
     def _shot(self, shared: Float, own: Float, starts: Float, rudder: Float) -> Float:
         """Do as `predicted`, for as many as go through together."""
@@ -99,14 +99,14 @@ class ShotRun:
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
         constants = run.constants(self.spec.rudder_speed_exponent)
-        found = np.empty((self.windows.rows.size, 3, MOST))
+        predicted = np.empty((self.windows.rows.size, 3, MOST))
         shoot(
             *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
             *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.offset_s, run.current_row),
             *(constants, self.windows.begins, self.windows.ends, x0),
-            *(self.model.table, found, LANES),
+            *(self.model.table, predicted, LANES),
         )
-        return found
+        return predicted
 
     def steps(self, at: Unknowns, scale: Float) -> Float:
         """Return the steps of the differences: shared, constants that there are, states; shape (6 + p + d + 3,)."""
@@ -134,11 +134,11 @@ class ShotRun:
         first = 0 if without is None else without[1].shape[2] - self.used.size - _STATES
         fresh = np.arange(first, by.size if without is None else at.shared.size)
         lanes = np.concatenate([[0], 1 + fresh])
-        found = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
+        predicted = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
         with np.errstate(invalid="ignore", over="ignore"):
-            slopes: Float = (found[..., 1:] - found[..., :1]) / by[fresh]
+            slopes: Float = (predicted[..., 1:] - predicted[..., :1]) / by[fresh]
         if without is None:
-            return found[..., 0], slopes
+            return predicted[..., 0], slopes
         return without[0], np.insert(without[1], np.full(fresh.size, first), slopes, axis=2)
 
     def _stepped(self, at: Unknowns, by: Float) -> tuple[Float, Float, Float]:

@@ -174,8 +174,8 @@ def _through_cell(
             )
             now = end if gone >= end - now else now + gone
             if crossed:
-                found = int(helm[3])
-                crossings[found] = begin_s + now
+                number = int(helm[3])
+                crossings[number] = begin_s + now
                 helm[3] += 1.0
                 # after the last leg the rudder keeps its order until the next manoeuvre begins
                 helm[2] = -side if helm[3] < zigzag[4] else 0.0

@@ -96,7 +96,7 @@ def sail(
         steering = step.steering(hull, float(tables.state[row, _HEADING]), stream(seed, f"manoeuvre {index}"))
         # one crossing a cell is more than any ship can do
         crossings = np.zeros(longest + 1 if isinstance(step, ZigzagTest) else 1)
-        done, found = steer(
+        done, count = steer(
             steering.kind,
             steering.settings,
             steering.orders,
@@ -110,7 +110,7 @@ def sail(
             tables.forcing,
             crossings,
         )
-        records.append(_record(step, tables, row, row + done, crossings[:found]))
+        records.append(_record(step, tables, row, row + done, crossings[:count]))
         row += done
     end = row + 1
     _check_range(hull, tables.state[:end])
@@ -137,7 +137,7 @@ def _record(step: Step, tables: _Tables, first: int, last: int, crossings: Float
 def _overshoots(step: ZigzagTest, tables: _Tables, base: float, instants: Float, last: int) -> tuple[float, ...]:
     """Return the greatest heading beyond psi0 after each crossing; the last instant is the end of the record."""
     side = 1.0 if step.first_side == "starboard" else -1.0
-    found = []
+    overshoots = []
     for begin, end in pairwise(instants):
         first, stop = int(np.ceil(begin / GRID_S)), min(int(end / GRID_S), last) + 1
         heading = side * (tables.state[first:stop, _HEADING] - base)
@@ -149,9 +149,9 @@ def _overshoots(step: ZigzagTest, tables: _Tables, base: float, instants: Float,
             # the vertex of the parabola through the three highest points
             left, right = heading[top - 1], heading[top + 1]
             peak -= float((right - left) ** 2 / (8.0 * (right - 2.0 * peak + left)))
-        found.append(peak - radians(step.heading_deg))
+        overshoots.append(peak - radians(step.heading_deg))
         side = -side
-    return tuple(found)
+    return tuple(overshoots)
 
 
 def _check(programme: tuple[Step, ...]) -> None:

@@ -41,25 +41,29 @@ def carried(hull: Hull, effects: ShipEffects | None, speed_m_s: float, arm_per_m
     if effects is None:
         return ()
     whole = linear_motion(hull, effects, speed_m_s, arm_per_m=arm_per_m)
-    found = []
+    statements = []
     for effect in effects.model.effects:
         name, size = effect.name, float(effects.of(effect.name)[0])
         if effect.rudder_course is not None:
-            found.append(_on_the_rudder(name, effect.rudder_course, size))
+            statements.append(_on_the_rudder(name, effect.rudder_course, size))
             continue
         bare = linear_motion(hull, effects.without(name), speed_m_s, arm_per_m=arm_per_m)
-        found.append(_compared(name, whole, bare, {_TAKEN[c] for c in effect.needs if c in _TAKEN}))
-    return tuple(found)
+        statements.append(_compared(name, whole, bare, {_TAKEN[c] for c in effect.needs if c in _TAKEN}))
+    return tuple(statements)
 
 
-def sentences(found: tuple[Carried, ...]) -> tuple[str, ...]:
+def sentences(statements: tuple[Carried, ...]) -> tuple[str, ...]:
     """Return what a user should know, those of no part together."""
-    absent = [one.effect for one in found if one.how == "no part of a straight course" and not one.sentence]
-    said = [one.sentence for one in found if one.sentence]
+    absent = [
+        statement.effect
+        for statement in statements
+        if statement.how == "no part of a straight course" and not statement.sentence
+    ]
+    lines = [statement.sentence for statement in statements if statement.sentence]
     if absent:
         verb = "is" if len(absent) == 1 else "are"
-        said.append(f"{', '.join(absent)} {verb} no part of a linear model about a straight course")
-    return tuple(said)
+        lines.append(f"{', '.join(absent)} {verb} no part of a linear model about a straight course")
+    return tuple(lines)
 
 
 def _on_the_rudder(name: str, course: str, size: float) -> Carried:
@@ -73,7 +77,7 @@ def _on_the_rudder(name: str, course: str, size: float) -> Carried:
     return Carried(name, "carried", "")
 
 
-def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str]) -> Carried:
+def _compared(name: str, whole: LinearMotion, bare: LinearMotion, assumptions: set[str]) -> Carried:
     if np.any(whole.corners > bare.corners + 1e-6):
         return Carried(
             name,
@@ -90,11 +94,11 @@ def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str
         if abs(moved) > _NEGLIGIBLE * _NOTHING:
             how = f": rudder at {degrees(whole.rudder_rad):.2g} deg"
         return Carried(name, "shifts the course", f"{name} only shifts the straight course{how}")
-    if taken:
+    if assumptions:
         return Carried(
             name,
             "no part of a straight course",
-            f"{name} is no part of the linear model: {', '.join(sorted(taken))} taken",
+            f"{name} is no part of the linear model: {', '.join(sorted(assumptions))} taken",
         )
     return Carried(name, "no part of a straight course", "")
 

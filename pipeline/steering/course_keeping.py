@@ -193,8 +193,8 @@ def _placed(A: Float, B: Float, hull: Hull, V: float, plant: StateSpace, setting
     # what effects add keeps the pace that it has, as far as it is stable
     steered = plant.steered
     added = np.linalg.eigvals(plant.A[np.ix_(steered[3:], steered[3:])]) if len(steered) > 3 else np.zeros(0)
-    wanted = np.concatenate([np.exp(np.array([-z * w + swing, -z * w - swing, fast]) * plant.step_s), added])
-    gain: Float = np.real(place_poles(A, B, wanted, method="YT").gain_matrix[0])
+    poles = np.concatenate([np.exp(np.array([-z * w + swing, -z * w - swing, fast]) * plant.step_s), added])
+    gain: Float = np.real(place_poles(A, B, poles, method="YT").gain_matrix[0])
     return gain
 
 

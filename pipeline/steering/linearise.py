@@ -80,12 +80,12 @@ class _Course:
         return (above - below) / (2.0 * _RUDDER_STEP), (y_above - y_below) / (2.0 * _RUDDER_STEP)
 
     def noise(self) -> Float:
-        found = []
+        squares = []
         for place in range(self.width - N_BEFORE):
             shared = (self.table, self.values, self.slopes, *self.room)
             dynamics.add_programs(dynamics.ON_NOISE + place, *shared, ONE)
-            found.append(float(self.room[2][0, 0]) ** 2)
-        return np.array(found)
+            squares.append(float(self.room[2][0, 0]) ** 2)
+        return np.array(squares)
 
     def rest(self) -> tuple[Float, float]:
         """Find the drift, the effects' states and the rudder with which she goes straight on; zero if none does."""
@@ -109,7 +109,7 @@ class _Course:
     def corners(self, x: Float, rudder_rad: float) -> Float:
         """Measure how much the derivatives jump across the course; what bends smoothly halves with the step."""
         here = self.at(x, rudder_rad)
-        found = np.zeros(3)
+        corners = np.zeros(3)
         for k, unit in enumerate((self.speed, self.speed / self.length, 1.0)):
             jumps = []
             for share in _BESIDE:
@@ -122,8 +122,8 @@ class _Course:
                 size = max(float(np.max(m)) for m in moved) or 1.0
                 jumps.append(max(float(np.max(np.abs(b))) for b in bent) / size)
             # the share of a corner is the same at both steps
-            found[k] = jumps[1] if jumps[1] > 1e-7 and jumps[1] > 0.75 * jumps[0] else 0.0
-        return found
+            corners[k] = jumps[1] if jumps[1] > 1e-7 and jumps[1] > 0.75 * jumps[0] else 0.0
+        return corners
 
     def motion(self) -> LinearMotion:
         x, rudder = self.rest()

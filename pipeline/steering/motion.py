@@ -77,10 +77,10 @@ class LinearMotion:
 
 
 def _reached(begin: list[int], goes_by: np.ndarray, own: range) -> list[int]:
-    found = list(begin)
-    for i in found:  # grows while it is walked
-        found += [j for j in own if goes_by[i, j] and j not in found]
-    return found
+    states = list(begin)
+    for i in states:  # grows while it is walked
+        states += [j for j in own if goes_by[i, j] and j not in states]
+    return states
 
 
 def linear_motion(

@@ -113,19 +113,19 @@ def nomoto(hull: Hull, covariance: Float, speed_m_s: float, length_m: float | No
             "a11 a22 - a12 a21 or a21 b1 - a11 b2 is exactly zero, expected another number: K or T3 is infinite.",
             "Take a parameter set from a manoeuvre that moved the ship.",
         )
-    wanted = ["K", "T3", "T", *(("T1", "T2") if poles == "real" else ("natural_frequency", "damping"))]
+    names = ["K", "T3", "T", *(("T1", "T2") if poles == "real" else ("natural_frequency", "damping"))]
     scales = {"K": ("K'", "1/s", (length_m or 0.0) / V), "T": ("T'", "s", V / (length_m or 1.0))}
-    found: dict[str, Constant] = {}
-    for name in wanted:
+    constants: dict[str, Constant] = {}
+    for name in names:
         value, std, interval = quotient(lambda q, name=name: _quotients(q, V, name), p, covariance)  # type: ignore[misc]
-        found[name] = Constant(name, value, std, _UNITS[name], interval)
+        constants[name] = Constant(name, value, std, _UNITS[name], interval)
         if length_m is not None and name in scales:
-            other, _, factor = scales[name]
+            symbol, _, factor = scales[name]
             scaled = None if interval is None else (factor * interval[0], factor * interval[1])
-            found[other] = Constant(other, factor * value, factor * std, "1", scaled)
-    order = [n for n in ("K", "T1", "T2", "T3", "T", "natural_frequency", "damping", "K'", "T'") if n in found]
+            constants[symbol] = Constant(symbol, factor * value, factor * std, "1", scaled)
+    order = [n for n in ("K", "T1", "T2", "T3", "T", "natural_frequency", "damping", "K'", "T'") if n in constants]
     warnings = _warnings(p, covariance, determinant, turning, apart)
-    return Nomoto(V, poles, {name: found[name] for name in order}, warnings)
+    return Nomoto(V, poles, {name: constants[name] for name in order}, warnings)
 
 
 #: (a11 + a22)^2 - 4 (a11 a22 - a12 a21) = p' Q p

@@ -39,12 +39,12 @@ class SteeredShips:
 
 def _steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects | None = None) -> SteeredShips:
     """Sample ships at the step of a law."""
-    made = []
+    models = []
     for theta in ships:
         own = replace(effects, values=theta[6:]) if effects is not None else None
-        made.append(continuous(Hull(*theta[:6].tolist()), _STILL, speed_m_s, effects=own))
-    held = zero_order_hold(np.array([one.A for one in made]), np.array([one.B for one in made]), law.step_s)
-    return SteeredShips(*held, np.array([one.measured for one in made]))
+        models.append(continuous(Hull(*theta[:6].tolist()), _STILL, speed_m_s, effects=own))
+    held = zero_order_hold(np.array([model.A for model in models]), np.array([model.B for model in models]), law.step_s)
+    return SteeredShips(*held, np.array([model.measured for model in models]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,6 +153,6 @@ def share_held(
         low = np.where(effects.model.low == 0.0, 0.01 * effects.values, effects.model.low)
         drawn = np.clip(ships[:, 6:], low, effects.model.high)
         ships[:, 6:] = np.where(effects.values == 0.0, 0.0, drawn)
-    made = _steered_ships(law, ships, speed_m_s, effects)
-    largest = np.max(np.abs(np.linalg.eigvals(_loop_matrices(law, made))), axis=1)
+    steered_ships = _steered_ships(law, ships, speed_m_s, effects)
+    largest = np.max(np.abs(np.linalg.eigvals(_loop_matrices(law, steered_ships))), axis=1)
     return float(np.mean(largest < 1.0))

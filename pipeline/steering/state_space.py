@@ -105,10 +105,10 @@ class StateSpace:
     @property
     def steered(self) -> list[int]:
         """Which states the rudder moves; v, r and psi are always among them."""
-        found = [i for i in range(len(self.states)) if i <= PSI or self.B[i, 0] != 0.0]
-        for i in found:  # grows while it is walked
-            found += [int(j) for j in np.flatnonzero(self.A[:, i]) if j not in found]
-        return sorted(found)
+        states = [i for i in range(len(self.states)) if i <= PSI or self.B[i, 0] != 0.0]
+        for i in states:  # grows while it is walked
+            states += [int(j) for j in np.flatnonzero(self.A[:, i]) if j not in states]
+        return sorted(states)
 
 
 def continuous(

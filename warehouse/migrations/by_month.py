@@ -58,7 +58,7 @@ def missing(warehouse: Warehouse, name: str) -> list[Held]:
         return []
     held = set() if is_by_log(warehouse, name) else delta.distinct(warehouse, name, "ingest_id")
     held |= _purged(warehouse)
-    return [one for one in _held(warehouse, name, before) if one.ingest_id not in held]
+    return [ingest for ingest in _held(warehouse, name, before) if ingest.ingest_id not in held]
 
 
 def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
@@ -82,7 +82,7 @@ def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
     done = 0
     for batch in batches(todo, MOST_LOGS, MOST_ROWS):
         # asked before anything is written: a table cannot be asked while the library writes
-        parts = [(one, scanned(source, name, _where(one))) for one in batch]
+        parts = [(ingest, scanned(source, name, _where(ingest))) for ingest in batch]
         _commit(table, name, parts, first=None)
         done += len(batch)
         yield done
@@ -109,8 +109,8 @@ def contents(warehouse: Warehouse, name: str, version: int | None = None) -> dic
     table = delta.open_table(warehouse, name, version)
     row = pl.struct(columns)
     hashed = scanned(table, name).select("ingest_id", one=row.hash(1), other=row.hash(2))
-    found = hashed.group_by("ingest_id").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
-    return {ingest: (count, one, other) for ingest, count, one, other in found.iter_rows()}
+    sums = hashed.group_by("ingest_id").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
+    return {ingest: (count, one, other) for ingest, count, one, other in sums.iter_rows()}
 
 
 def require_same(warehouse: Warehouse, name: str) -> int:
@@ -164,8 +164,8 @@ def _held(warehouse: Warehouse, name: str, version: int) -> list[Held]:
     key, ingest = pl.col("partition.vessel_key").alias("vessel_key"), pl.col("partition.ingest_id").alias("ingest_id")
     rows = files.group_by(key, ingest).agg(pl.col("num_records").sum()).rows()
     months = _months(warehouse, {str(row[1]) for row in rows})
-    found = [Held(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows]
-    return sorted(found, key=lambda one: (one.vessel_key, one.month, one.ingest_id))
+    ingests = [Held(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows]
+    return sorted(ingests, key=lambda held: (held.vessel_key, held.month, held.ingest_id))
 
 
 def _months(warehouse: Warehouse, ingests: set[str]) -> dict[str, str]:
@@ -186,19 +186,19 @@ def _months(warehouse: Warehouse, ingests: set[str]) -> dict[str, str]:
     return months
 
 
-def _where(one: Held) -> dict[str, str]:
-    return {"vessel_key": one.vessel_key, "ingest_id": one.ingest_id}
+def _where(ingest: Held) -> dict[str, str]:
+    return {"vessel_key": ingest.vessel_key, "ingest_id": ingest.ingest_id}
 
 
 def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame]:
     import polars as pl
 
-    for one, rows in parts:
+    for ingest, rows in parts:
         for batch in rows.collect_batches(maintain_order=True):
-            yield batch.with_columns(pl.lit(one.month).alias("month"))
+            yield batch.with_columns(pl.lit(ingest.month).alias("month"))
 
 
 def _commit(table: DeltaTable, name: str, parts: Sequence[tuple[Held, pl.LazyFrame]], *, first: int | None) -> None:
-    said = None if first is None else {_BEFORE: first}
+    metadata = None if first is None else {_BEFORE: first}
     with alone(name):
-        delta.append_alone(table, name, _frames(parts), lay_out=said)
+        delta.append_alone(table, name, _frames(parts), lay_out=metadata)

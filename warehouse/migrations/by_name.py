@@ -54,8 +54,8 @@ def missing(warehouse: Warehouse, name: str) -> list[Held]:
     name : str
         One of `tables`.
     """
-    found = [one for one in _held(delta.open_table(warehouse, name), name) if _is_earlier(one.key)]
-    return sorted(found, key=lambda one: (one.key, one.month or ""))
+    folders = [folder for folder in _held(delta.open_table(warehouse, name), name) if _is_earlier(folder.key)]
+    return sorted(folders, key=lambda folder: (folder.key, folder.month or ""))
 
 
 def require_known(warehouse: Warehouse) -> None:
@@ -104,7 +104,7 @@ def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
             # read by another handle: a table cannot be asked while the library writes to it
             source = delta.open_table(warehouse, name, table.version())
             assert source is not None
-            each = [where for one in batch for where in _wheres(one, names)]
+            each = [where for folder in batch for where in _wheres(folder, names)]
             parts = [scanned(source, name)] if whole else [p for where in each for p in by_file(source, name, where)]
             predicate = None if whole else _predicate(batch, names)
             with alone(name):
@@ -150,8 +150,8 @@ def contents(warehouse: Warehouse, name: str, version: int) -> dict[str, tuple[i
     hashed = scanned(delta.open_table(warehouse, name, version), name).select(
         "vessel", one=row.hash(1), other=row.hash(2)
     )
-    found = hashed.group_by("vessel").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
-    return {vessel: (count, one, other) for vessel, count, one, other in found.iter_rows()}
+    sums = hashed.group_by("vessel").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
+    return {vessel: (count, one, other) for vessel, count, one, other in sums.iter_rows()}
 
 
 def _compare(warehouse: Warehouse, name: str, since: int, until: int) -> int:
@@ -161,7 +161,7 @@ def _compare(warehouse: Warehouse, name: str, since: int, until: int) -> int:
     differ = sorted(vessel for vessel in then.keys() | now.keys() if then.get(vessel) != now.get(vessel))
     if differ:
         first = differ[0]
-        had, has = (found.get(first, (0, 0, 0))[0] for found in (then, now))
+        had, has = (sums.get(first, (0, 0, 0))[0] for sums in (then, now))
         raise KempfError(
             "migration_differs",
             f"Of {len(then)} vessels in the table {name} {len(differ)} have other rows than before, the first "
@@ -196,8 +196,8 @@ def _held(table: DeltaTable | None, name: str) -> list[Held]:
     files = pl.DataFrame(table.get_add_actions(flatten=True))
     month = pl.col("partition.month") if "month" in folders else pl.lit(None, dtype=pl.String)
     by = [pl.col(f"partition.{_KEY}").alias(_KEY), month.alias("month")]
-    found = files.group_by(by).agg(pl.col("num_records").sum()).rows()
-    return [Held(str(key), month, int(count or 0)) for key, month, count in found]
+    counts = files.group_by(by).agg(pl.col("num_records").sum()).rows()
+    return [Held(str(key), month, int(count or 0)) for key, month, count in counts]
 
 
 def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
@@ -209,8 +209,8 @@ def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
         ``vessel_key_unknown``.
     """
     rows = scanned(delta.open_table(warehouse, name), name).select(_KEY, "vessel").unique()
-    found = set(rows.collect(engine="streaming").rows())
-    for key, vessel in sorted(found, key=repr):
+    pairs = set(rows.collect(engine="streaming").rows())
+    for key, vessel in sorted(pairs, key=repr):
         if not vessel or key not in (earlier_key(vessel), vessel_key(vessel)):
             raise KempfError(
                 "vessel_key_unknown",
@@ -219,20 +219,20 @@ def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
                 "Nothing was changed. Delete them by the version that wrote them, or report it.",
                 {"table": name, "vessel": vessel, "vessel_key": key},
             )
-    return found
+    return pairs
 
 
-def _wheres(one: Held, names: dict[str, str]) -> list[dict[str, str]]:
+def _wheres(folder: Held, names: dict[str, str]) -> list[dict[str, str]]:
     """Return what is read of a folder: also what is under the new key already, as it is put in place of both."""
-    month = {} if one.month is None else {"month": one.month}
-    return [{_KEY: key, **month} for key in (one.key, vessel_key(names[one.key]))]
+    month = {} if folder.month is None else {"month": folder.month}
+    return [{_KEY: key, **month} for key in (folder.key, vessel_key(names[folder.key]))]
 
 
 def _predicate(batch: Sequence[Held], names: dict[str, str]) -> str:
     """Return what names the rows of some folders, under either key."""
     months: dict[str, list[str]] = {}
-    for one in batch:
-        months.setdefault(one.key, []).extend([] if one.month is None else [one.month])
+    for folder in batch:
+        months.setdefault(folder.key, []).extend([] if folder.month is None else [folder.month])
     each = []
     for key, held in months.items():
         either = one_of(_KEY, (key, vessel_key(names[key])))

@@ -37,9 +37,9 @@ def standing(warehouse: Warehouse) -> int:
         ``warehouse_layout``: it is newer; ``warehouse_marker_damaged``.
     """
     forward(warehouse).require()
-    found = warehouse.marker()
-    assert found is not None
-    begun = found.layout if found.migrating is None else found.migrating
+    marker = warehouse.marker()
+    assert marker is not None
+    begun = marker.layout if marker.migrating is None else marker.migrating
     if begun != LAYOUT and begun not in STEPS:
         raise KempfError(
             "warehouse_layout_old",
@@ -79,33 +79,33 @@ def migrate(warehouse: Warehouse, look: commits.Look) -> list[str]:
     UsageError
         ``vessel_key_taken``: two names would have one key; nothing was changed.
     """
-    said: list[str] = []
+    sentences: list[str] = []
     passing = forward(warehouse)
     while (begun := standing(warehouse)) != LAYOUT:
-        found = passing.marker()
-        if found == Marker(begun):
+        marker = passing.marker()
+        if marker == Marker(begun):
             _require_whole(passing, look)
             by_name.require_known(passing)
-        if found != Marker(LAYOUT, migrating=begun):
+        if marker != Marker(LAYOUT, migrating=begun):
             # first, so that versions that would write as before, or had begun this, find a newer layout from here on
             passing.mark(Marker(LAYOUT, migrating=begun))
-        said += STEPS[begun].carry_out(passing, look)
+        sentences += STEPS[begun].carry_out(passing, look)
         passing.mark(Marker(LAYOUT) if begun + 1 == LAYOUT else Marker(LAYOUT, migrating=begun + 1))
-    return said
+    return sentences
 
 
 def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
-    found = list(unfinished(warehouse))
+    problems = list(unfinished(warehouse))
     for name in TABLES:
         look(0, 1, f"table {name}")
-        found += [one for one in damages(warehouse, name) if not one.past]
-    if found:
+        problems += [problem for problem in damages(warehouse, name) if not problem.past]
+    if problems:
         raise KempfError(
             "warehouse_damaged",
-            f"The warehouse {warehouse.uri} cannot be brought forward: {len(found)} problems, the first: "
-            f"{found[0].words}",
+            f"The warehouse {warehouse.uri} cannot be brought forward: {len(problems)} problems, the first: "
+            f"{problems[0].words}",
             "Repair it with the version of kempf that wrote it: `kempf repair`; nothing was changed.",
-            {"problems": [one.show() for one in found]},
+            {"problems": [problem.show() for problem in problems]},
         )
 
 
@@ -116,12 +116,12 @@ def mend_marker(warehouse: Warehouse) -> bool:
     one, `kempf migrate` goes on from there.
     """
     try:
-        found = warehouse.marker()
+        marker = warehouse.marker()
     except KempfError as error:
         if error.code != "warehouse_marker_damaged":
             raise
     else:
-        if found is not None or not _has_tables(warehouse):
+        if marker is not None or not _has_tables(warehouse):
             return False
     passing = forward(warehouse)
     # the earliest first: to look into the tables it has to be there

@@ -38,11 +38,11 @@ def batches(todo: Sequence[Piece], most: int, most_rows: int) -> Iterator[list[P
         Pieces, and rows of several of them, of one commit.
     """
     batch: list[Piece] = []
-    for one in todo:
-        if batch and (len(batch) == most or sum(b.rows for b in batch) + one.rows > most_rows):
+    for piece in todo:
+        if batch and (len(batch) == most or sum(b.rows for b in batch) + piece.rows > most_rows):
             yield batch
             batch = []
-        batch.append(one)
+        batch.append(piece)
     if batch:
         yield batch
 
@@ -105,5 +105,5 @@ def overtaken(name: str) -> KempfError:
 
 def version_said(table: DeltaTable, key: str) -> int | None:
     """Return the version that the newest commit which says one says under a key; None where none does."""
-    said = (entry.get(key) for entry in table.history())
-    return next((int(version) for version in said if version is not None), None)
+    versions = (entry.get(key) for entry in table.history())
+    return next((int(version) for version in versions if version is not None), None)

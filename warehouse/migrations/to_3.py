@@ -23,24 +23,24 @@ _BEFORE_CURRENT = ("model", "pooled")
 
 def to_do(warehouse: Warehouse) -> list[str]:
     """Return what is to be done to a warehouse of layout 2, a phrase each."""
-    found = []
+    phrases = []
     for name in BY_MONTH:
         ingests = by_month.missing(warehouse, name)
         if ingests:
-            rows = sum(one.rows for one in ingests)
-            found.append(f"{name} of {len(ingests)} ingests ({rows} rows) are laid out by vessel and month")
+            rows = sum(ingest.rows for ingest in ingests)
+            phrases.append(f"{name} of {len(ingests)} ingests ({rows} rows) are laid out by vessel and month")
         elif by_month.is_by_log(warehouse, name):
-            found.append(f"{name}, which has no rows, is laid out by vessel and month")
+            phrases.append(f"{name}, which has no rows, is laid out by vessel and month")
     pointed = _pointed(warehouse)
     if pointed:
-        found.append(f"{len(pointed)} aliases of before there was 'current' become 'current'")
+        phrases.append(f"{len(pointed)} aliases of before there was 'current' become 'current'")
     commits = sealing.unsealed(warehouse)
     if commits:
-        found.append(f"{commits} commits of tables are sealed")
+        phrases.append(f"{commits} commits of tables are sealed")
     logs = len(deposit.not_described(warehouse))
     if logs:
-        found.append(f"{logs} raw logs are described beside their bytes")
-    return found
+        phrases.append(f"{logs} raw logs are described beside their bytes")
+    return phrases
 
 
 def holds(warehouse: Warehouse) -> bool:

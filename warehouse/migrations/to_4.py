@@ -15,8 +15,8 @@ from kempf.warehouse.store import Warehouse
 def to_do(warehouse: Warehouse) -> list[str]:
     """Return what is to be done to a warehouse of layout 3, or of an earlier one, a phrase each."""
     held = {name: by_name.missing(warehouse, name) for name in by_name.tables()}
-    tables = [name for name, found in held.items() if found]
-    rows = sum(one.rows for found in held.values() for one in found)
+    tables = [name for name, folders in held.items() if folders]
+    rows = sum(folder.rows for folders in held.values() for folder in folders)
     return [f"{rows} rows of {len(tables)} tables get keys that read as their vessels' names"] if tables else []
 
 

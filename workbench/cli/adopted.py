@@ -17,13 +17,17 @@ def take_back(warehouse: Warehouse, *, as_json: bool) -> None:
     from kempf.warehouse import equivalents
 
     warehouse.require()
-    taken = equivalents.withdraw(warehouse)
+    entries = equivalents.withdraw(warehouse)
     if as_json:
         print_json(
-            {"taken_back": [{"stage": one.stage, "code": one.code, "stood_for": one.stands_for} for one in taken]}
+            {
+                "taken_back": [
+                    {"stage": entry.stage, "code": entry.code, "stood_for": entry.stands_for} for entry in entries
+                ]
+            }
         )
         return
-    for one in taken:
-        click.echo(f"{one.stage} code {one.code} counts as {one.stands_for} no longer; next: kempf reprocess")
-    if not taken:
+    for entry in entries:
+        click.echo(f"{entry.stage} code {entry.code} counts as {entry.stands_for} no longer; next: kempf reprocess")
+    if not entries:
         click.echo("The present code counts as no other: there is nothing to take back.")

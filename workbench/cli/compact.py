@@ -41,13 +41,13 @@ def command(more_files_than: int, vacuum: bool, days: float, dry_run: bool, uri:
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
-    done = () if dry_run else compaction.compact(warehouse, more_files_than)
+    tables = () if dry_run else compaction.compact(warehouse, more_files_than)
     cleared = compaction.vacuum(warehouse, 24.0 * days, dry_run=dry_run) if vacuum or dry_run else ()
     if as_json:
-        print_json({"compacted": list(done), "vacuumed": [one.show() for one in cleared], "dry_run": dry_run})
+        print_json({"compacted": list(tables), "vacuumed": [table.show() for table in cleared], "dry_run": dry_run})
         return
     if not dry_run:
-        click.echo(f"compacted: {', '.join(done) or 'nothing, no table has so many files'}")
+        click.echo(f"compacted: {', '.join(tables) or 'nothing, no table has so many files'}")
     if cleared:
         rows = [[c.table, str(c.files), f"{c.size_bytes / 1e6:.3f}", str(c.kept_versions)] for c in cleared]
         print_table(["table", "files to go" if dry_run else "files deleted", "MB", "versions kept"], rows)

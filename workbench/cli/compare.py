@@ -75,11 +75,11 @@ def command(
 
     if fail_above is not None and not isfinite(fail_above):
         raise UsageError("threshold", f"--fail-above {fail_above} is no limit.", "Give a percentage such as 20.")
-    wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
-    figures = require_figures(figure, len(wanted))
+    names: list[str | None] = [*dict.fromkeys(sets)] or [None]
+    figures = require_figures(figure, len(names))
     warehouse = Warehouse(uri)
     with progress_bar() as progress:
-        compared = [compare_vessel(warehouse, vessel, name, horizon, progress) for name in wanted]
+        compared = [compare_vessel(warehouse, vessel, name, horizon, progress) for name in names]
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
     for comparison, path in zip_longest(compared, figures):
@@ -98,7 +98,7 @@ def command(
     else:
         for document in documents:
             _print_comparison(document, verbose=verbose)
-    above = [one for one in documents if fail_above is not None and one["fail_above"]["exceeded"]]
+    above = [document for document in documents if fail_above is not None and document["fail_above"]["exceeded"]]
     for document in above:
         judged = document["judged"]
         click.echo(

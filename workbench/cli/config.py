@@ -22,7 +22,9 @@ def command(as_json: bool) -> None:
 
     settings = every()
     if as_json:
-        print_json([one.show() for one in settings])
+        print_json([setting.show() for setting in settings])
         return
-    rows = [[one.name, one.value or "-", one.source or "-", VARIABLES[one.name]] for one in settings]
+    rows = [
+        [setting.name, setting.value or "-", setting.source or "-", VARIABLES[setting.name]] for setting in settings
+    ]
     print_table(["setting", "value", "set by", "variable"], rows)

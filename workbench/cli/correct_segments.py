@@ -111,20 +111,20 @@ def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     rows = {row.log_id: row for row in logs.current(warehouse, vessel)}
     when = said.times(warehouse, "corrections")
     listed: list[dict[str, Any]] = []
-    for one in corrections.all_of(warehouse, rows if vessel is not None else None):
-        row, bounds = rows.get(one.log_id), one.correction.bounds_utc_ns
+    for entry in corrections.all_of(warehouse, rows if vessel is not None else None):
+        row, bounds = rows.get(entry.log_id), entry.correction.bounds_utc_ns
         listed.append(
             {
-                "number": one.number,
-                "at": when[one.number].isoformat().replace("+00:00", "Z") if one.number in when else None,
+                "number": entry.number,
+                "at": when[entry.number].isoformat().replace("+00:00", "Z") if entry.number in when else None,
                 "vessel": row.vessel if row else None,
-                "log_id": one.log_id,
+                "log_id": entry.log_id,
                 "log": row.file_name if row else None,
-                "segment_id": one.segment_id,
-                "action": one.correction.action,
+                "segment_id": entry.segment_id,
+                "action": entry.correction.action,
                 "start": iso_utc(bounds[0]) if bounds else None,
                 "end": iso_utc(bounds[1]) if bounds else None,
-                "reason": one.correction.reason,
+                "reason": entry.correction.reason,
             }
         )
     if as_json:
@@ -135,11 +135,11 @@ def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
         head,
         [
             [
-                *(str(one["number"]), str(one["at"] or "-")[:19], str(one["log"] or one["log_id"][:12])),
-                *(str(one["segment_id"] or "-"), str(one["action"])),
-                *(str(one["start"] or "-")[:19], str(one["end"] or "-")[:19], one_line(str(one["reason"]))),
+                *(str(line["number"]), str(line["at"] or "-")[:19], str(line["log"] or line["log_id"][:12])),
+                *(str(line["segment_id"] or "-"), str(line["action"])),
+                *(str(line["start"] or "-")[:19], str(line["end"] or "-")[:19], one_line(str(line["reason"]))),
             ]
-            for one in listed
+            for line in listed
         ],
     )
 
@@ -162,13 +162,13 @@ def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bo
 
 def _words(planned: Planned) -> str:
     """Say what changes, a sentence without its full stop."""
-    done = {"correct": "gets other bounds", "exclude": "is excluded", "accept": "counts", "add": "is added"}
-    what = f"{_described(planned.before or planned.after)} {done[planned.correction.action]}"
+    outcomes = {"correct": "gets other bounds", "exclude": "is excluded", "accept": "counts", "add": "is added"}
+    sentence = f"{_described(planned.before or planned.after)} {outcomes[planned.correction.action]}"
     if planned.before is not None and planned.after.segment_id != planned.before.segment_id:
-        what += f" and is {_described(planned.after)}"
-    found = planned.following
-    current = ", the current one among them" if found.current else ""
-    return f"{what}: {counted(len(found.set_ids), 'parameter set')} of {found.vessel!r} superseded{current}"
+        sentence += f" and is {_described(planned.after)}"
+    following = planned.following
+    current = ", the current one among them" if following.current else ""
+    return f"{sentence}: {counted(len(following.set_ids), 'parameter set')} of {following.vessel!r} superseded{current}"
 
 
 def _described(segment: Segment) -> str:

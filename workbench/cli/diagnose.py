@@ -98,43 +98,45 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
     first = _first_model(document["ladder"][0])
     ladder = [
         [
-            str(one["step"]),
-            one["added"] or first,
-            *leg_percent(one),
-            free_run_percent(one["in_sample_error"], one["in_sample"]),
-            free_run_percent(one["held_out_error"], one["held_out"]),
-            number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
+            str(rung["step"]),
+            rung["added"] or first,
+            *leg_percent(rung),
+            free_run_percent(rung["in_sample_error"], rung["in_sample"]),
+            free_run_percent(rung["held_out_error"], rung["held_out"]),
+            number(rung["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
         ]
-        for one in document["ladder"]
+        for rung in document["ladder"]
     ]
     print_table(["step", "added", *LEG, *FREE, "wind, m/s^2/s^0.5"], ladder, "Error one leg ahead and of free runs, %")
     shown = [
-        one
-        for one in document["candidates"]
-        if everything or one["verdict"] in ("present", "immaterial", "negligible") or one["score"] is not None
+        candidate
+        for candidate in document["candidates"]
+        if everything
+        or candidate["verdict"] in ("present", "immaterial", "negligible")
+        or candidate["score"] is not None
     ]
     shown = shown if everything else shown[:_SHOWN]
     rows = [
         [
-            one["effect"],
-            one["set_id"] or "-",
-            number(one["score"], 3),
-            _change(one["expected_change"]),
-            number(one["absorption"], 3),
-            one["verdict"].replace("_", " "),
+            candidate["effect"],
+            candidate["set_id"] or "-",
+            number(candidate["score"], 3),
+            _change(candidate["expected_change"]),
+            number(candidate["absorption"], 3),
+            candidate["verdict"].replace("_", " "),
         ]
-        for one in shown
+        for candidate in shown
     ]
     head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict"]
     print_table(head, rows, f"Screened beside the {first}")
     reasons: dict[str, list[str]] = {}
-    for one in shown:
-        reasons.setdefault(one["why"], []).append(one["effect"])
+    for candidate in shown:
+        reasons.setdefault(candidate["why"], []).append(candidate["effect"])
     for why, effects in reasons.items():
         click.echo(f"  {', '.join(effects)}: {why}")
     if not everything and len(document["candidates"]) > _SHOWN:
         click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
-    claimed = next((name for one in document["sets"] for name in one["effects"]), None)
+    claimed = next((name for group in document["sets"] for name in group["effects"]), None)
     if claimed:
         vessel = document["vessel"]
         click.echo(f"next: kempf effects add {claimed} --vessel {vessel}, kempf ladder --vessel {vessel}")

@@ -103,8 +103,8 @@ def _symbols() -> dict[str, Any]:
 
 
 def _print_symbols() -> None:
-    known = _symbols()
-    print_table(["acts on", "what it is"], list(known["targets"].items()), "Before the colon")
-    print_table(["symbol", "what it is"], list(known["symbols"].items()), "After the colon")
-    click.echo(f"  functions: {', '.join(known['functions'])}; operations: + - * / **")
+    vocabulary = _symbols()
+    print_table(["acts on", "what it is"], list(vocabulary["targets"].items()), "Before the colon")
+    print_table(["symbol", "what it is"], list(vocabulary["symbols"].items()), "After the colon")
+    click.echo(f"  functions: {', '.join(vocabulary['functions'])}; operations: + - * / **")
     click.echo("  numbers to be estimated: c, c1 to c9, k, k1 to k9, tau, tau1 to tau9")

@@ -48,11 +48,13 @@ def _print_candidate(document: Mapping[str, Any]) -> None:
     click.echo(click.style(f"{document['formula']} on {document['vessel']}", bold=True))
     click.echo(f"  score {number(candidate['score'])}, p = {number(candidate['p_adjusted'], 2)}")
     click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
-    for one in refits(document):
-        for parameter, value in one["parameters"].items():
+    for refit in refits(document):
+        for parameter, value in refit["parameters"].items():
             shown = f"  {parameter} = {number(value['value'])} ± {number(value['std'], 2)} {value['unit']}"
             click.echo(shown.rstrip())
-        click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {one['better']} of {one['of']} manoeuvres better")
+        click.echo(
+            f"  refitted: BIC {number(refit['bic_change'], 3)}, {refit['better']} of {refit['of']} manoeuvres better"
+        )
     kept = bool(document["sets"])
     if document["immaterial"]:
         click.echo(f"  it holds, but is immaterial: {candidate['why']}")
@@ -108,14 +110,16 @@ def add(
     warehouse = Warehouse(uri)
     begin = chosen_model(warehouse, vessel, None, model, mine)
     with progress_bar() as progress:
-        made = add_effect(warehouse, vessel, name, mine, progress, begin=begin, force=force)
-    rungs = rungs_to(warehouse, made)
+        parameter_set = add_effect(warehouse, vessel, name, mine, progress, begin=begin, force=force)
+    rungs = rungs_to(warehouse, parameter_set)
     if as_json:
-        print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
+        print_json(
+            {"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": parameter_set.show()}
+        )
         return
     print_rungs(rungs[-2:], vessel)
     _print_runs(rungs[-2], rungs[-1])
-    show_warnings(made.warnings, verbose=verbose)
+    show_warnings(parameter_set.warnings, verbose=verbose)
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
 
 

@@ -33,18 +33,18 @@ def command(vessel: str, start: str, end: str, set_id: str | None, uri: str, as_
         print_json(document)
         return
     rows = []
-    for one in document["effects"]:
-        if one["score"] is not None:
+    for effect in document["effects"]:
+        if effect["score"] is not None:
             sizes = (
-                f"{name} {number(s['value'])} ± {number(s['std'], 2)} {s['unit']}" for name, s in one["size"].items()
+                f"{name} {number(s['value'])} ± {number(s['std'], 2)} {s['unit']}" for name, s in effect["size"].items()
             )
-            share = one["explained_of_misfit"]
+            share = effect["explained_of_misfit"]
             explained = None if share is None else 100.0 * share
             rows.append(
                 [
-                    one["effect"],
-                    number(one["score"], 3),
-                    number(one["p_adjusted"], 2),
+                    effect["effect"],
+                    number(effect["score"], 3),
+                    number(effect["p_adjusted"], 2),
                     number(explained, 3),
                     ", ".join(sizes),
                 ]

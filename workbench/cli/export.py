@@ -146,41 +146,41 @@ def mcap_file(
     require_new(output, "--output")
     warehouse = Warehouse(uri)
     with progress_bar() as progress:
-        found = compare_vessel(warehouse, vessel, set_id, "1", progress)
+        comparison = compare_vessel(warehouse, vessel, set_id, "1", progress)
     print_note(said_of_vessel(warehouse, vessel))
-    found = _only(found, segments) if segments else found
-    data = to_mcap(found.runs, about(found), measured_positions(warehouse, found.found))
+    comparison = _only(comparison, segments) if segments else comparison
+    data = to_mcap(comparison.runs, about(comparison), measured_positions(warehouse, comparison.found))
     write_new(output, data, "--output")
-    name = found.parameter_set.parameter_set_id
+    name = comparison.parameter_set.parameter_set_id
     if as_json:
         content = {
             "vessel": vessel,
             "parameter_set_id": name,
             "format": "mcap",
             "out": str(output),
-            "runs": len(found.runs),
+            "runs": len(comparison.runs),
         }
-        print_json({**content, "skipped": found.skipped})
+        print_json({**content, "skipped": comparison.skipped})
     else:
-        click.echo(f"{vessel}, {name}: {counted(len(found.runs), 'run')} written to {output}", err=True)
+        click.echo(f"{vessel}, {name}: {counted(len(comparison.runs), 'run')} written to {output}", err=True)
 
 
-def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
+def _only(comparison: Comparison, beginnings: Sequence[str]) -> Comparison:
     """Return a comparison with the runs of some segments alone; a unique beginning of an id is enough."""
-    known = [run.name for run in found.runs]
+    names = [run.name for run in comparison.runs]
     chosen = set()
-    for asked in wanted:
-        named = [name for name in known if name.startswith(asked)]
+    for beginning in beginnings:
+        named = [name for name in names if name.startswith(beginning)]
         if len(named) != 1:
             raise NotFound(
                 "no_segment",
-                f"{asked!r} begins {len(named)} ids of the manoeuvres that the set predicts: {', '.join(known)}.",
-                f"Name one of them; `kempf segments --vessel {found.vessel}` lists them all.",
-                {"segment_id": asked, "known": known, "skipped": found.skipped},
+                f"{beginning!r} begins {len(named)} ids of the manoeuvres that the set predicts: {', '.join(names)}.",
+                f"Name one of them; `kempf segments --vessel {comparison.vessel}` lists them all.",
+                {"segment_id": beginning, "known": names, "skipped": comparison.skipped},
             )
         chosen.update(named)
-    pairs = [pair for pair in zip(found.runs, found.found, strict=True) if pair[0].name in chosen]
-    return replace(found, runs=tuple(run for run, _ in pairs), found=tuple(segment for _, segment in pairs))
+    pairs = [pair for pair in zip(comparison.runs, comparison.found, strict=True) if pair[0].name in chosen]
+    return replace(comparison, runs=tuple(run for run, _ in pairs), found=tuple(segment for _, segment in pairs))
 
 
 def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | None, step: float, course: float) -> Any:
@@ -203,9 +203,9 @@ def _text(form: str, set_id: str | None, vessel: str | None, output: Path | None
     from kempf.workbench.export import as_text
 
     warehouse = Warehouse(uri)
-    one = named_set(warehouse, set_id, vessel)
-    print_note(said_of_sets(warehouse, [one]))
-    _deliver(form, one.parameter_set_id, as_text(one, form), output, as_json)
+    parameter_set = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [parameter_set]))
+    _deliver(form, parameter_set.parameter_set_id, as_text(parameter_set, form), output, as_json)
 
 
 def _deliver(form: str, name: str, content: str | bytes, output: Path | None, as_json: bool) -> None:

@@ -84,11 +84,11 @@ def command(
     if file_format is not None:
         _write(histories, file_format, output)
         return
-    for name, found in histories.items():
+    for name, vessel_history in histories.items():
         if instant is None:
             print_note(said_of_vessel(warehouse, name))
-        if found.note:
-            click.echo(found.note, err=as_json)
+        if vessel_history.note:
+            click.echo(vessel_history.note, err=as_json)
     if not changes:
         _show(histories, as_json=as_json)
         if not as_json:
@@ -98,9 +98,9 @@ def command(
     # each kind of sets has a figure of its own
     figures = iter(require_figures(figure, sum(map(len, kinds.values()))))
     documents = []
-    for name, found in histories.items():
+    for name, vessel_history in histories.items():
         tested = [_drawn(examined(kind, occasion_h), next(figures, None), name) for kind in kinds[name]]
-        documents.append(changes_document(name, found, tested))
+        documents.append(changes_document(name, vessel_history, tested))
     if as_json:
         print_json(documents[0] if len(documents) == 1 else documents)
         return
@@ -190,9 +190,9 @@ def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | No
     from kempf.workbench.cli.note import words_of
 
     for name in names:
-        for one in notes.of_vessel(warehouse, name):
-            if as_of is None or one.written is None or one.written <= as_of:
-                click.echo(f"note: {words_of(one)}")
+        for note in notes.of_vessel(warehouse, name):
+            if as_of is None or note.written is None or note.written <= as_of:
+                click.echo(f"note: {words_of(note)}")
 
 
 def _drawn(examined: Examined, figure: Path | None, vessel: str) -> dict[str, Any]:
@@ -214,13 +214,13 @@ _SEVERAL = "made of several segments"
 
 def _print_all(examined: Sequence[dict[str, Any]]) -> None:
     """Print what was found of each model and estimator that has sets to compare; the other sets in one sentence."""
-    for one in examined:
-        if one["sets"]:
-            _print_changes(one)
+    for report in examined:
+        if report["sets"]:
+            _print_changes(report)
     out: Counter[str] = Counter()
-    for one in examined:
-        out.update({reason: n for reason, n in one["left_out"].items() if reason == _SEVERAL or not one["sets"]})
-    if examined and not any(one["sets"] for one in examined):
+    for report in examined:
+        out.update({reason: n for reason, n in report["left_out"].items() if reason == _SEVERAL or not report["sets"]})
+    if examined and not any(report["sets"] for report in examined):
         click.echo(f"{click.style(examined[0]['verdict'], bold=True)}: no set of a single manoeuvre to compare")
     if out:
         print_paragraph(f"left out: {_left_out(out)}", indent="")
@@ -233,16 +233,16 @@ def _left_out(reasons: Mapping[str, int]) -> str:
     )
 
 
-def _print_changes(one: dict[str, Any]) -> None:
+def _print_changes(report: dict[str, Any]) -> None:
     """Print what was found of one model and estimator, for a person."""
-    left = _left_out({reason: n for reason, n in one["left_out"].items() if reason != _SEVERAL})
-    testable = not one["verdict"].startswith("not testable")
-    about = f"{counted(one['sets'], 'set')} on {counted(len(one['occasions']), 'occasion')}: " if testable else ""
-    click.echo(f"model {one['model']}, estimator {one['estimator']}: {click.style(one['verdict'], bold=True)}")
-    print_paragraph(f"{about}{one['why']}")
+    left = _left_out({reason: n for reason, n in report["left_out"].items() if reason != _SEVERAL})
+    testable = not report["verdict"].startswith("not testable")
+    about = f"{counted(report['sets'], 'set')} on {counted(len(report['occasions']), 'occasion')}: " if testable else ""
+    click.echo(f"model {report['model']}, estimator {report['estimator']}: {click.style(report['verdict'], bold=True)}")
+    print_paragraph(f"{about}{report['why']}")
     if left:
         print_paragraph(f"left out: {left}")
-    pooled = one["pooled"]
+    pooled = report["pooled"]
     if pooled is not None and pooled["poolable"] is not None:
         p_value = f"= {number(pooled['p_value'], 2)}" if pooled["p_value"] > _LEAST_P else f"< {_LEAST_P:g}"
         may, larger = "may be pooled", ""
@@ -253,11 +253,11 @@ def _print_changes(one: dict[str, Any]) -> None:
             f"the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
             f"p {p_value}{larger}"
         )
-    for change in one["changes"]:
+    for change in report["changes"]:
         _print_change(change)
     if not testable:
         return
-    smallest, scatter = one["smallest_step_seen"], one["scatter_between_trials"]
+    smallest, scatter = report["smallest_step_seen"], report["scatter_between_trials"]
     rows = [
         [name, number(s["value"], 3), _percent(s["percent"]), _percent(scatter[name]["percent"]), s["unit"]]
         for name, s in smallest.items()
@@ -272,13 +272,13 @@ def _percent(share: float) -> str:
 
 
 def _print_change(change: dict[str, Any]) -> None:
-    one, other = (t[:10] for t in change["between"])
+    first, last = (t[:10] for t in change["between"])
     sure = f"{100 * change['confidence']:g} %"
     if change["kind"] == "step":
         low, high = (t[:10] for t in change["interval"])
-        head = f"step between {one} and {other} ({sure} interval {low} to {high})"
+        head = f"step between {first} and {last} ({sure} interval {low} to {high})"
     else:
-        head = f"drift from {one} to {other}, per year"
+        head = f"drift from {first} to {last}, per year"
     doubt = "; step or drift, the data hardly decide" if change["bic_ahead_of_other_form"] < 2 else ""
     rows = [
         [

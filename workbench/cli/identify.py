@@ -118,8 +118,8 @@ def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | Non
         click.echo(f"current of {vessel}: no set; none of them converged")
         return
     name, model = current.parameter_set_id, current.model_name
-    what = "pooled" if len(current.segment_ids) > 1 else "one manoeuvre"
-    click.echo(f"current of {vessel}: {name}, {model}, {what}")
+    basis = "pooled" if len(current.segment_ids) > 1 else "one manoeuvre"
+    click.echo(f"current of {vessel}: {name}, {model}, {basis}")
     if pooled is not None and pooled.parameter_set_id != name:
         click.echo(f"  it stays; to have the pooled one: kempf params alias current {pooled.parameter_set_id}")
 

@@ -62,14 +62,16 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
 
 
 def _print_run(run: InboxRun) -> None:
-    said = [f"{counted(len(run.ingested), 'log')} ingested", f"{run.known} known"]
+    parts = [f"{counted(len(run.ingested), 'log')} ingested", f"{run.known} known"]
     if run.waiting:
-        said.append(f"{len(run.waiting)} left for the next run, as they are being written or their profile is not read")
-    click.echo(", ".join(said))
-    for one in run.quarantined:
-        mark = "" if one.address in run.tried else " (as before)"
+        parts.append(
+            f"{len(run.waiting)} left for the next run, as they are being written or their profile is not read"
+        )
+    click.echo(", ".join(parts))
+    for file in run.quarantined:
+        mark = "" if file.address in run.tried else " (as before)"
         click.echo(
-            f"{click.style('quarantined', fg='red')}{mark} [{one.code}] {one_line(one.address)}\n"
-            f"  {one_line(one.message or '')} {one_line(one.next_step or '')}",
+            f"{click.style('quarantined', fg='red')}{mark} [{file.code}] {one_line(file.address)}\n"
+            f"  {one_line(file.message or '')} {one_line(file.next_step or '')}",
             err=True,
         )

@@ -53,9 +53,9 @@ def command(
     from kempf.warehouse.store import Warehouse
 
     paths, beside = logs_in(paths)
-    given = read_profiles(profiles or beside) if profiles or beside else None
+    profile = read_profiles(profiles or beside) if profiles or beside else None
     with progress_bar() as progress:
-        outcomes = ingest(Warehouse(uri), paths, vessel, given, progress, new_vessel=new_vessel)
+        outcomes = ingest(Warehouse(uri), paths, vessel, profile, progress, new_vessel=new_vessel)
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(outcomes) == 1 and failed:
         raise failed[0]
@@ -76,11 +76,11 @@ def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, n
     for outcome in outcomes:
         _print_channels(outcome, named=len(outcomes) > 1)
     if notes:
-        said: dict[str, list[str]] = {}
+        remarks: dict[str, list[str]] = {}
         for outcome in outcomes:
-            said.setdefault(one_line(Path(outcome.path).name), []).extend(outcome.notes)
-        every = [f"{name}: {note}" if len(said) > 1 else note for name, of_log in said.items() for note in of_log]
-        show_warnings(every if verbose else of_several(said), verbose=verbose, word="note")
+            remarks.setdefault(one_line(Path(outcome.path).name), []).extend(outcome.notes)
+        every = [f"{name}: {note}" if len(remarks) > 1 else note for name, of_log in remarks.items() for note in of_log]
+        show_warnings(every if verbose else of_several(remarks), verbose=verbose, word="note")
 
 
 def _print_outcome(outcome: IngestOutcome) -> None:
@@ -94,7 +94,11 @@ def _print_outcome(outcome: IngestOutcome) -> None:
     if outcome.lost:
         from kempf.flows.jobs.unreadable_stretches import as_json
 
-        times = [one["since"] or one["until"] for one in as_json(outcome.lost) if one["since"] or one["until"]]
+        times = [
+            stretch["since"] or stretch["until"]
+            for stretch in as_json(outcome.lost)
+            if stretch["since"] or stretch["until"]
+        ]
         many = f"{len(outcome.lost)} stretch{'es' if len(outcome.lost) > 1 else ''} of this log could not be read"
         from_then = f", the first from {times[0]} on" if times else ""
         click.echo(f"  {click.style('partial', fg='yellow')}: {many}{from_then}")
@@ -103,14 +107,14 @@ def _print_outcome(outcome: IngestOutcome) -> None:
 def _ledger(tally: Tally) -> str:
     """Say what was read of a log: records, and the values of those kept where some are rejected; both sums close."""
     reasons = ", ".join(f"{count} {reason}" for reason, count in tally.by_reason.items())
-    said = f"{tally.records_read} records read = {tally.records_kept} kept + {tally.records_rejected} rejected"
+    sentence = f"{tally.records_read} records read = {tally.records_kept} kept + {tally.records_rejected} rejected"
     if tally.values_rejected:
-        said += (
+        sentence += (
             f"; {tally.values_read} values in the kept ones = {tally.values_kept} kept + "
             f"{tally.values_rejected} rejected"
         )
-        return f"{said}; rejected records and values by reason: {reasons}"
-    return f"{said} ({reasons})" if reasons else said
+        return f"{sentence}; rejected records and values by reason: {reasons}"
+    return f"{sentence} ({reasons})" if reasons else sentence
 
 
 def _print_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
@@ -119,22 +123,22 @@ def _print_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
     if examination is None or examination.verdict not in ("faults", "failed"):
         return
     for words in examination.findings or (str(examination.content.get("why", "")),):
-        said = "channels" if examination.verdict == "faults" else "the channel doctor failed"
+        label = "channels" if examination.verdict == "faults" else "the channel doctor failed"
         of = f" of {one_line(Path(outcome.path).name)}" if named else ""
-        click.echo(f"  {click.style(said, fg='yellow')}{of}: {one_line(words)[:600]}")
+        click.echo(f"  {click.style(label, fg='yellow')}{of}: {one_line(words)[:600]}")
     if examination.findings and outcome.log_id:
         click.echo(f"  next: kempf doctor {outcome.log_id[:12]}")
 
 
 def _found(outcome: IngestOutcome) -> str:
     """Say which zigzags were found, and behind them what else."""
-    found = [
+    zigzags = [
         f"{s.psi0_deg:g}/{s.delta0_deg:g} to {s.first_side}{' (broken off)' if s.kind != 'zigzag' else ''}"
         for s in outcome.segments
         if s.is_zigzag
     ]
-    irregular = len(outcome.segments) - len(found)
-    said = [f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"]
-    said += [counted(irregular, "random manoeuvre")] if irregular else []
+    irregular = len(outcome.segments) - len(zigzags)
+    parts = [f"{counted(len(zigzags), 'zigzag')}: {', '.join(zigzags)}" if zigzags else "no zigzag"]
+    parts += [counted(irregular, "random manoeuvre")] if irregular else []
     others = [f"{s.words} with {s.delta0_deg:.3g} deg to {s.first_side}" for s in outcome.others]
-    return "; ".join([*said, *([f"kept for validation: {', '.join(others)}"] if others else [])])
+    return "; ".join([*parts, *([f"kept for validation: {', '.join(others)}"] if others else [])])

@@ -61,15 +61,15 @@ def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> Non
         return
     rows = [
         [
-            *(one["log_id"][:12], one["vessel"], _shortened(one["file_name"]), str(one["start"])[:16]),
-            *(str(one["records_kept"]), str(one["records_rejected"]), _brief(one["channels"])),
+            *(log["log_id"][:12], log["vessel"], _shortened(log["file_name"]), str(log["start"])[:16]),
+            *(str(log["records_kept"]), str(log["records_rejected"]), _brief(log["channels"])),
         ]
-        for one in facts
+        for log in facts
     ]
     head = ["log", "vessel", "file name", "start UTC", "records kept", "rejected", "channels"]
     if gone:
         head.append("damage")
-        rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, listed.rows, strict=True)]
+        rows = [[*row, _damage(gone.get(log.ingest_id, ()))] for row, log in zip(rows, listed.rows, strict=True)]
     print_table(head, rows)
 
 
@@ -116,8 +116,8 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     channels = shown.pop("channels")
     for name, value in shown.items():
         listed = value if isinstance(value, list) else [value]
-        for one in listed:
-            click.echo(f"{name.replace('_', ' ')}: {one_line(str(one))}")
+        for entry in listed:
+            click.echo(f"{name.replace('_', ' ')}: {one_line(str(entry))}")
     if channels is None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:
@@ -128,7 +128,7 @@ def _damage(lost: Sequence[LostStretch]) -> str:
     """Say in a word what of a log is lost."""
     if not lost:
         return ""
-    counted = [one.messages for one in lost if one.messages is not None]
+    counted = [stretch.messages for stretch in lost if stretch.messages is not None]
     many = f", {sum(counted)} messages" if len(counted) == len(lost) else ""
     return f"partial: {len(lost)} stretch{'es' if len(lost) > 1 else ''} lost{many}"
 
@@ -172,13 +172,13 @@ def quarantine(uri: str, as_json: bool) -> None:
 
     held = inbox.quarantined(Warehouse(uri))
     if as_json:
-        print_json([quarantine_json(one) for one in held])
+        print_json([quarantine_json(file) for file in held])
         return
     if not held:
         click.echo("no file is in quarantine")
-    for one in held:
-        click.echo(f"{one_line(one.address)}: [{one.code}] {one_line(one.message or '')}")
-        click.echo(f"  {one_line(one.next_step or '')}")
+    for file in held:
+        click.echo(f"{one_line(file.address)}: [{file.code}] {one_line(file.message or '')}")
+        click.echo(f"  {one_line(file.next_step or '')}")
 
 
 @command.command("release")
@@ -204,8 +204,8 @@ def release_file(
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.cli.ingest import tell_outcomes
 
-    given = read_profiles(profiles) if profiles else None
-    outcome = release(Warehouse(uri), file, vessel, given, new_vessel=new_vessel)
+    profile = read_profiles(profiles) if profiles else None
+    outcome = release(Warehouse(uri), file, vessel, profile, new_vessel=new_vessel)
     if as_json:
         print_json(outcome.show())
     else:
@@ -246,9 +246,9 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
     confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
-    found = remove(warehouse, [row], reason)
+    following = remove(warehouse, [row], reason)
     if as_json:
-        print_json(found.show())
+        print_json(following.show())
     else:
         click.echo(f"{one_line(row.file_name)}: removed; next: {command_for([row.vessel])}")
 
@@ -295,10 +295,10 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
         pass
     else:
         confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
-    found, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
+    following, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
     if as_json:
-        print_json({**facts_of(now), "following": found.show() if found else None})
+        print_json({**facts_of(now), "following": following.show() if following else None})
         return
-    of = [vessel] if found is None else [found.vessel, vessel]
+    of = [vessel] if following is None else [following.vessel, vessel]
     again = " ".join(f"--vessel {name}" for name in of)
     click.echo(f"{one_line(now.file_name)}: a log of {vessel} now; next: kempf reprocess {again}")

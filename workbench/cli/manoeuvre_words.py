@@ -61,7 +61,7 @@ def figures(segment: Segment) -> list[str]:
         rate = point["yaw_rate_deg_s"]
         steady = "" if point["steady"] else ", not steady yet"
         lines.append(f"{point['rudder_deg']:+.1f} deg: {_with_interval(rate)} deg/s{steady}")
-    criteria = {name: _criterion(name, one) for name, one in segment.imo.items()}
+    criteria = {name: _criterion(name, criterion) for name, criterion in segment.imo.items()}
     return [*lines, *criteria.values(), *segment.quality["reasons"]]
 
 
@@ -81,7 +81,7 @@ def _with_interval(figure: Mapping[str, Any]) -> str:
     return f"{value} ({number(figure['low'], _DIGITS)} to {number(figure['high'], _DIGITS)})"
 
 
-def _criterion(name: str, one: Mapping[str, Any]) -> str:
-    if one["passed"] is None:
-        return f"IMO {name} n/a: {one['why']}"
-    return f"IMO {name} {'passed' if one['passed'] else 'FAILED'}: at most {one['limit_lengths']:g} L"
+def _criterion(name: str, criterion: Mapping[str, Any]) -> str:
+    if criterion["passed"] is None:
+        return f"IMO {name} n/a: {criterion['why']}"
+    return f"IMO {name} {'passed' if criterion['passed'] else 'FAILED'}: at most {criterion['limit_lengths']:g} L"

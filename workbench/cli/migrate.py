@@ -31,12 +31,12 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
         shown = "; ".join(plan.to_do) or "only its marker is written"
         confirm(f"The warehouse {uri} goes from layout {plan.since} to {plan.until}: {shown}", yes=yes)
     with progress_bar() as progress:
-        done = migrate(warehouse, progress)
+        migration = migrate(warehouse, progress)
     if as_json:
-        print_json(done.show())
-    elif done.since == done.until:
-        click.echo(f"nothing to do: the warehouse has layout {done.until}")
+        print_json(migration.show())
+    elif migration.since == migration.until:
+        click.echo(f"nothing to do: the warehouse has layout {migration.until}")
     else:
-        for words in done.compared:
+        for words in migration.compared:
             click.echo(one_line(words))
-        click.echo(f"the warehouse has layout {done.until}; next: kempf verify")
+        click.echo(f"the warehouse has layout {migration.until}; next: kempf verify")

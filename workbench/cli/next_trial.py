@@ -25,33 +25,33 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     from kempf.warehouse.store import Warehouse
 
     with progress_bar() as progress:
-        found = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).show()
+        document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).show()
     if as_json:
-        print_json(found)
+        print_json(document)
         return
-    for sentence in found["sentences"]:
+    for sentence in document["sentences"]:
         print_paragraph(sentence)
     print_paragraph("")
-    for step, line in enumerate(found["order"], start=1):
+    for step, line in enumerate(document["order"], start=1):
         print_paragraph(f"{step}. {line}")
-    parting = found["trials"][0]["probability"] is not None
+    parting = document["trials"][0]["probability"] is not None
     head = ["zigzag", "takes, s", "sea room, m", "errors become, %"]
     head += ["parts the models, %"] if parting else []
     head += [f"{parameter} becomes, %", "to halve it"] if parameter is not None else []
     rows = []
-    for one in found["trials"]:
-        sailed = one["manoeuvre"]
+    for trial in document["trials"]:
+        sailed = trial["manoeuvre"]
         row = [
-            f"{sailed['heading_deg']:g}/{sailed['rudder_deg']:g}{' *' if one['beyond_what_was_sailed'] else ''}",
-            number(one["duration_s"], 3),
-            " x ".join(f"{x:.0f}" for x in one["sea_room_m"]),
-            number(100.0 * one["mean_narrowed"], 3),
+            f"{sailed['heading_deg']:g}/{sailed['rudder_deg']:g}{' *' if trial['beyond_what_was_sailed'] else ''}",
+            number(trial["duration_s"], 3),
+            " x ".join(f"{x:.0f}" for x in trial["sea_room_m"]),
+            number(100.0 * trial["mean_narrowed"], 3),
         ]
-        row += [number(100.0 * one["probability"], 3)] if parting else []
+        row += [number(100.0 * trial["probability"], 3)] if parting else []
         if parameter is not None:
-            times = one["times_to_halve"]
-            row += [number(100.0 * one["narrowed"][parameter], 3), "more than 64" if times is None else str(times)]
+            times = trial["times_to_halve"]
+            row += [number(100.0 * trial["narrowed"][parameter], 3), "more than 64" if times is None else str(times)]
         rows.append(row)
-    print_table(head, rows, f"{found['parameter_set_id']} of {vessel}, at {number(found['speed_m_s'], 3)} m/s")
-    if any(one["beyond_what_was_sailed"] for one in found["trials"]):
+    print_table(head, rows, f"{document['parameter_set_id']} of {vessel}, at {number(document['speed_m_s'], 3)} m/s")
+    if any(trial["beyond_what_was_sailed"] for trial in document["trials"]):
         print_paragraph("* the rudder goes beyond what was sailed")

@@ -58,11 +58,11 @@ def command(
             vessels.require(warehouse, vessel)
         listed = notes.of_vessel(warehouse, vessel)
         if as_json:
-            print_json([one.show() for one in listed])
+            print_json([entry.show() for entry in listed])
         elif not listed:
             click.echo("no notes")
-        for one in [] if as_json else listed:
-            click.echo(words_of(one))
+        for entry in [] if as_json else listed:
+            click.echo(words_of(entry))
         return
     whose, subject, subject_id = subject_of(warehouse, vessel, log, segment, set_id)
     event = utc_ns_of(at, "--at") if at is not None else None

@@ -92,9 +92,9 @@ def output_option(help_text: str = "Write here instead of to stdout.", *, requir
     )
 
 
-def figure_option(what: str) -> Callable[[F], F]:
+def figure_option(purpose: str) -> Callable[[F], F]:
     """Add ``--figure``: a file that is not there yet, or None."""
-    help_text = f"{what}: .png, .svg or .pdf."
+    help_text = f"{purpose}: .png, .svg or .pdf."
     return click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help=help_text)
 
 

@@ -67,24 +67,27 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     from kempf.workbench.parameter_set_table import tell_set
 
     warehouse = Warehouse(uri)
-    one = named_set(warehouse, set_id, vessel)
-    print_note(said_of_sets(warehouse, [one]))
+    parameter_set = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [parameter_set]))
     if as_json:
-        print_json(one.show())
+        print_json(parameter_set.show())
         return
-    title = f"{one.parameter_set_id}: {one.vessel}, model {one.model_name}, estimator {one.estimator}"
-    tell_set(one, title, verbose=verbose)
+    title = (
+        f"{parameter_set.parameter_set_id}: {parameter_set.vessel}, model {parameter_set.model_name}, "
+        f"estimator {parameter_set.estimator}"
+    )
+    tell_set(parameter_set, title, verbose=verbose)
     print_table(
         ["", "value", "std", "unit"],
-        [[p.name, number(p.value), number(p.std, 2), p.unit] for p in one.discrete],
-        f"Discrete, eq. (17), at {number(one.convergence.get('speed_m_s'))} m/s and a step of "
-        f"{number(one.convergence.get('step_s'))} s",
+        [[p.name, number(p.value), number(p.std, 2), p.unit] for p in parameter_set.discrete],
+        f"Discrete, eq. (17), at {number(parameter_set.convergence.get('speed_m_s'))} m/s and a step of "
+        f"{number(parameter_set.convergence.get('step_s'))} s",
     )
-    effects = one.model_spec.get("effects")
+    effects = parameter_set.model_spec.get("effects")
     if effects:
         click.echo(f"  of the hull alone, without {', '.join(effects)}; with them: kempf export control")
-    origin = one.provenance
-    click.echo(f"  log {', '.join(one.log_ids)}")
+    origin = parameter_set.provenance
+    click.echo(f"  log {', '.join(parameter_set.log_ids)}")
     click.echo(f"  profile {origin['profile_sha256']}, code {origin['code_version']}, commit {origin['git_commit']}")
 
 
@@ -144,9 +147,9 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
     from kempf.workbench.new_file import write_new
 
     warehouse = Warehouse(uri)
-    one = named_set(warehouse, set_id, vessel)
-    print_note(said_of_sets(warehouse, [one]))
-    text = as_text(one, "json" if as_json else form)
+    parameter_set = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [parameter_set]))
+    text = as_text(parameter_set, "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
     else:
@@ -169,14 +172,21 @@ def alias(name: str, set_id: str, vessel: str | None, uri: str, as_json: bool) -
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
-    one = named_set(warehouse, set_id, vessel)
-    before = aliases.of_vessel(warehouse, one.vessel).get(name)
-    aliases.point(warehouse, one.vessel, one.parameter_set_id, name)
+    parameter_set = named_set(warehouse, set_id, vessel)
+    before = aliases.of_vessel(warehouse, parameter_set.vessel).get(name)
+    aliases.point(warehouse, parameter_set.vessel, parameter_set.parameter_set_id, name)
     if as_json:
-        print_json({"vessel": one.vessel, "alias": name, "parameter_set_id": one.parameter_set_id, "before": before})
+        print_json(
+            {
+                "vessel": parameter_set.vessel,
+                "alias": name,
+                "parameter_set_id": parameter_set.parameter_set_id,
+                "before": before,
+            }
+        )
         return
-    moved = f", before {before}" if before not in (None, one.parameter_set_id) else ""
-    click.echo(f"{name} of {one.vessel}: {one.parameter_set_id}{moved}")
+    moved = f", before {before}" if before not in (None, parameter_set.parameter_set_id) else ""
+    click.echo(f"{name} of {parameter_set.vessel}: {parameter_set.parameter_set_id}{moved}")
 
 
 @command.command("steering")
@@ -252,7 +262,7 @@ def _as_json(value: Constant | Value) -> dict[str, object]:
     return {"value": value.value, "std": value.std, "unit": value.unit, **interval}
 
 
-def _interval(one: Constant) -> str:
-    if one.interval_95 is None:
-        return "unbounded" if isfinite(one.std) else "-"
-    return f"{number(one.interval_95[0])} to {number(one.interval_95[1])}"
+def _interval(constant: Constant) -> str:
+    if constant.interval_95 is None:
+        return "unbounded" if isfinite(constant.std) else "-"
+    return f"{number(constant.interval_95[0])} to {number(constant.interval_95[1])}"

@@ -82,18 +82,18 @@ def command(
     heading, rudder = _angles(angles) if angles is not None else (20.0, 20.0)
     request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed, rudder_rate)
     with progress_bar() as progress:
-        made = predict_checked(Warehouse(uri), vessel, request, progress)
-        measured = measured_beside(Warehouse(uri), made, progress) if compare else None
+        predicted = predict_checked(Warehouse(uri), vessel, request, progress)
+        measured = measured_beside(Warehouse(uri), predicted, progress) if compare else None
     if figure is not None:
         from kempf.workbench.figures.manoeuvre import draw_manoeuvre
 
         with writing(figure):
-            draw_manoeuvre(made.prediction, figure, _title(made))
+            draw_manoeuvre(predicted.prediction, figure, _title(predicted))
     if as_json:
-        beside = {"measured": [one.show() for one in measured]} if measured is not None else {}
-        print_json({**made.show(), **beside, "figure": str(figure) if figure else None})
+        beside = {"measured": [run.show() for run in measured]} if measured is not None else {}
+        print_json({**predicted.show(), **beside, "figure": str(figure) if figure else None})
     else:
-        _print_predicted(made, figure)
+        _print_predicted(predicted, figure)
         if measured is not None:
             _print_measured(measured)
 
@@ -106,46 +106,51 @@ def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | Non
 
 
 def _angles(text: str) -> tuple[float, float]:
-    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)\s*", text)
-    if found is None:
+    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)\s*", text)
+    if match is None:
         raise UsageError(
             "angles_unreadable", f"--angles {text!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
         )
-    return float(found[1]), float(found[2])
+    return float(match[1]), float(match[2])
 
 
-def _title(made: Predicted) -> str:
-    manoeuvre = made.show()["manoeuvre"]
+def _title(predicted: Predicted) -> str:
+    manoeuvre = predicted.show()["manoeuvre"]
     kind = manoeuvre["kind"].replace("-", " ")
-    what = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
+    words = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
     if kind == "zigzag":
-        what = f"{manoeuvre['heading_deg']:g}/{manoeuvre['rudder_deg']:g} zigzag"
+        words = f"{manoeuvre['heading_deg']:g}/{manoeuvre['rudder_deg']:g} zigzag"
     side = f" to {manoeuvre['side']}" if "side" in manoeuvre else ""
-    return f"{made.vessel}, {made.parameter_set.parameter_set_id}: {what}{side} at {number(made.speed_m_s, 3)} m/s"
+    return (
+        f"{predicted.vessel}, {predicted.parameter_set.parameter_set_id}: {words}{side} at "
+        f"{number(predicted.speed_m_s, 3)} m/s"
+    )
 
 
-def _print_predicted(made: Predicted, figure: Path | None) -> None:
-    shown = made.show()
+def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
+    shown = predicted.show()
     manoeuvre = shown["manoeuvre"]
-    rows = [_row(name, f, manoeuvre) for name, f in made.prediction.figures.items()]
-    print_table(["figure", "value", "95 % interval", "unit"], rows, _title(made))
+    rows = [_row(name, f, manoeuvre) for name, f in predicted.prediction.figures.items()]
+    print_table(["figure", "value", "95 % interval", "unit"], rows, _title(predicted))
     if len(shown["models"]) > 1:
-        _print_models(made)
-    for one in made.prediction.imo:
-        limit = f"{number(one.limit)} {one.unit}: " if one.limit is not None else ""
+        _print_models(predicted)
+    for criterion in predicted.prediction.imo:
+        limit = f"{number(criterion.limit)} {criterion.unit}: " if criterion.limit is not None else ""
         verdict = (
-            f"fulfilled with a probability of {100 * one.probability:.0f} %"
-            if one.probability is not None
+            f"fulfilled with a probability of {100 * criterion.probability:.0f} %"
+            if criterion.probability is not None
             else "not judged"
         )
-        print_paragraph(f"IMO {one.name}, at most {limit}{verdict}" + (f" ({one.why})" if one.why else ""))
-    for beyond in made.prediction.extrapolated:
+        print_paragraph(
+            f"IMO {criterion.name}, at most {limit}{verdict}" + (f" ({criterion.why})" if criterion.why else "")
+        )
+    for beyond in predicted.prediction.extrapolated:
         print_paragraph(f"extrapolated: {beyond.sentence}")
-    if made.own_zigzags is not None:
-        print_paragraph(made.own_zigzags.sentence)
-    for sentence in made.limits:
+    if predicted.own_zigzags is not None:
+        print_paragraph(predicted.own_zigzags.sentence)
+    for sentence in predicted.limits:
         print_paragraph(f"limit: {sentence}")
-    for sentence in made.assumed:
+    for sentence in predicted.assumed:
         print_paragraph(f"assumed: {sentence}")
     if figure is not None:
         click.echo(f"  drawn: {figure}")
@@ -159,13 +164,13 @@ def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
     return [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
 
 
-def _print_models(made: Predicted) -> None:
-    first = next(iter(made.prediction.figures))
+def _print_models(predicted: Predicted) -> None:
+    first = next(iter(predicted.prediction.figures))
     words, unit = FIGURES[first.partition(".")[0]]
     rows = []
-    for one in made.prediction.models:
-        figure = one.figures[first]
-        rows.append([one.model.title, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
+    for member in predicted.prediction.models:
+        figure = member.figures[first]
+        rows.append([member.model.title, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
     print_table([f"{words} of the model", "value", "95 % interval", "unit"], rows)
 
 
@@ -174,25 +179,25 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
         return
     rows = []
-    for one in measured:
-        for beside in one.figures:
+    for run in measured:
+        for beside in run.figures:
             figure, inside = beside.predicted, beside.show()["inside"]
             base, _, place = beside.name.partition(".")
             words = in_words(base, int(place) if place else None, {})
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
-                about = (one.segment_id[:12], one.side, one.sample.replace("_", " "), words)
+                about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)
                 verdict = "yes" if inside else "no"
                 rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
     print_table(
         head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
     )
-    shown = [beside.show() for one in measured for beside in one.figures]
-    judged = [one for one in shown if one["inside"] is not None]
+    shown = [beside.show() for run in measured for beside in run.figures]
+    judged = [entry for entry in shown if entry["inside"] is not None]
     if judged:
-        inside = sum(one["inside"] for one in judged)
+        inside = sum(entry["inside"] for entry in judged)
         print_paragraph(f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction")
-    for one in measured:
-        if one.why:
-            print_paragraph(f"{one.segment_id}: {one.why}")
+    for run in measured:
+        if run.why:
+            print_paragraph(f"{run.segment_id}: {run.why}")

@@ -31,23 +31,23 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     warehouse = Warehouse(uri)
     mended = mend_marker(warehouse)
     with progress_bar() as progress:
-        found = verify(warehouse, lambda what: progress(0, 1, what))
-    if found:
-        confirm(f"{counted(len(found), 'problem')}, the first: {found[0].words.rstrip('.')}", yes=yes)
+        problems = verify(warehouse, lambda what: progress(0, 1, what))
+    if problems:
+        confirm(f"{counted(len(problems), 'problem')}, the first: {problems[0].words.rstrip('.')}", yes=yes)
     with progress_bar() as progress:
-        done = repair(warehouse, progress)
+        outcome = repair(warehouse, progress)
     if mended:
-        done.done.insert(0, "The file that marks the warehouse was written anew.")
+        outcome.done.insert(0, "The file that marks the warehouse was written anew.")
     if as_json:
-        print_json(done.show())
+        print_json(outcome.show())
     else:
-        for words in done.done:
+        for words in outcome.done:
             click.echo(one_line(words))
-        for words in done.gone:
+        for words in outcome.gone:
             click.echo(f"lost: {one_line(words)}")
-        for one in done.left:
-            click.echo(f"still wrong: {one_line(one.words)}")
-        nothing = "nothing could be made again" if done.left else "nothing had to be done"
-        click.echo("next: kempf reprocess" if done.done or done.gone else nothing)
-    if done.left:
+        for problem in outcome.left:
+            click.echo(f"still wrong: {one_line(problem.words)}")
+        nothing = "nothing could be made again" if outcome.left else "nothing had to be done"
+        click.echo("next: kempf reprocess" if outcome.done or outcome.gone else nothing)
+    if outcome.left:
         sys.exit(DataRejected.exit_code)

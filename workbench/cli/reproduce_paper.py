@@ -30,53 +30,53 @@ def command(folder: Path, as_json: bool) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with progress_bar() as progress:
-            made = reproduce_paper(progress)
-        figures = draw(made, folder)
+            reproduction = reproduce_paper(progress)
+        figures = draw(reproduction, folder)
     except OSError as error:
         raise UsageError(
             "cannot_write", f"Writing to {folder} failed: {error.strerror or error}.", "Give another folder."
         ) from error
     if as_json:
-        print_json({**made.show(), "figures": [str(path) for path in figures]})
+        print_json({**reproduction.show(), "figures": [str(path) for path in figures]})
         return
-    _print_reproduction(made)
+    _print_reproduction(reproduction)
     click.echo(click.style("Figures", bold=True))
     for path in figures:
         click.echo(f"  {path}")
 
 
-def draw(made: Reproduction, folder: Path) -> list[Path]:
+def draw(reproduction: Reproduction, folder: Path) -> list[Path]:
     """Draw the paper's three figures of the experiment with the least noise into a folder; return their paths."""
     from kempf.workbench.figures.disturbed_zigzag import draw_disturbed_zigzag
     from kempf.workbench.figures.iterations import draw_iterations
 
-    shown = made.experiments[0]
+    shown = reproduction.experiments[0]
     figures = [folder / f"figure-{k}.png" for k in (1, 2, 3)]
     last = len(shown.course.passes) - 1
     noise = f"{shown.noise_factor:g} times the noise of usual instruments"
-    for path, estimated, what in (
+    for path, estimated, stage in (
         (figures[0], shown.first, "after the first approximation"),
         (figures[2], shown.last, f"after iteration {last}"),
     ):
-        draw_disturbed_zigzag(shown.time_s, shown.true, shown.measured, estimated, path, f"{what}; {noise}")
-    draw_iterations(shown.procedure.iterations, made.discrete, figures[1], f"parameters of eq. (17); {noise}")
+        draw_disturbed_zigzag(shown.time_s, shown.true, shown.measured, estimated, path, f"{stage}; {noise}")
+    draw_iterations(shown.procedure.iterations, reproduction.discrete, figures[1], f"parameters of eq. (17); {noise}")
     return figures
 
 
-def _print_reproduction(made: Reproduction) -> None:
-    rows = [[name, value, by] for name, (value, by) in made.conditions.items()]
+def _print_reproduction(reproduction: Reproduction) -> None:
+    rows = [[name, value, by] for name, (value, by) in reproduction.conditions.items()]
     print_table(["condition", "value", "stated by"], rows, "The experiment")
     click.echo()
-    for experiment in made.experiments:
-        _print_experiment(made, experiment)
+    for experiment in reproduction.experiments:
+        _print_experiment(reproduction, experiment)
 
 
-def _print_experiment(made: Reproduction, experiment: Experiment) -> None:
+def _print_experiment(reproduction: Reproduction, experiment: Experiment) -> None:
     shown = experiment.show()
     rows = [
         [
             name,
-            number(made.truth[name]),
+            number(reproduction.truth[name]),
             number(row["paper_percent"], 3),
             *(number(row[key], 3) for key in ("first_percent", "last_percent", "ml_percent")),
             number(row["ml_std_percent"], 2),

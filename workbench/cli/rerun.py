@@ -122,31 +122,33 @@ def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afres
     from kempf.flows.jobs.rerun_all import verify_all
 
     with progress_bar() as progress:
-        found = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=progress)
+        verification = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=progress)
     if as_json:
-        print_json(found.show())
+        print_json(verification.show())
     else:
-        _print_verification(found)
-    counts = found.counts()
+        _print_verification(verification)
+    counts = verification.counts()
     if counts["failed"]:
         sys.exit(DataRejected.exit_code)
     if counts["different"]:
         sys.exit(ThresholdExceeded.exit_code)
 
 
-def _print_verification(found: Verification) -> None:
-    this, other = found.counts(code_changed=False), found.counts(code_changed=True)
-    rows = [[verdict, str(n), str(this[verdict]), str(other[verdict])] for verdict, n in found.counts().items()]
+def _print_verification(verification: Verification) -> None:
+    this, other = verification.counts(code_changed=False), verification.counts(code_changed=True)
+    rows = [[verdict, str(n), str(this[verdict]), str(other[verdict])] for verdict, n in verification.counts().items()]
     print_table(["verdict", "sets", "of this code", "of other code"], rows)
-    before = sum(v.known_before for v in found.verdicts)
+    before = sum(v.known_before for v in verification.verdicts)
     if before:
         click.echo(f"{before} of these were verified before by this code; --afresh builds them again, too.")
-    if found.of_purged_logs:
-        click.echo(f"{len(found.of_purged_logs)} rest on a log that was purged, and cannot be built again.")
-    for one in found.verdicts:
-        if one.error is not None:
-            click.echo(f"{one.vessel}, {one.parameter_set_id}: {one.error.message} {one.error.next_step}", err=True)
-        elif one.verdict == "different":
-            fields = ", ".join(str(d["field"]) for d in one.fields[:3])
-            more = f" and {one.differences - 3} more" if one.differences > 3 else ""
-            click.echo(f"{one.vessel}, {one.parameter_set_id}: different in {fields}{more}")
+    if verification.of_purged_logs:
+        click.echo(f"{len(verification.of_purged_logs)} rest on a log that was purged, and cannot be built again.")
+    for result in verification.verdicts:
+        if result.error is not None:
+            click.echo(
+                f"{result.vessel}, {result.parameter_set_id}: {result.error.message} {result.error.next_step}", err=True
+            )
+        elif result.verdict == "different":
+            fields = ", ".join(str(d["field"]) for d in result.fields[:3])
+            more = f" and {result.differences - 3} more" if result.differences > 3 else ""
+            click.echo(f"{result.vessel}, {result.parameter_set_id}: different in {fields}{more}")

@@ -42,7 +42,7 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
                 "parameters": shown,
                 "vessels": [vessel_preview.show() for vessel_preview in previews],
                 "moves": [m.show() for m in moves],
-                **({"adopted": [vars(one) for one in adopted]} if adopt else {}),
+                **({"adopted": [vars(equivalent) for equivalent in adopted]} if adopt else {}),
             }
         )
     else:
@@ -64,10 +64,10 @@ def _adopted(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[Eq
 def _print_adopted(adopted: Sequence[Equivalent]) -> None:
     if not adopted:
         click.echo("There is nothing to adopt: the present code counts as the one that made what is stored.")
-    for one in adopted:
+    for equivalent in adopted:
         click.echo(
-            f"adopted: {one.stage} code {one.code} counts as {one.stands_for}, on the evidence of {one.sets} sets of "
-            f"{len(one.vessels)} vessel{'' if len(one.vessels) == 1 else 's'}"
+            f"adopted: {equivalent.stage} code {equivalent.code} counts as {equivalent.stands_for}, on the evidence of "
+            f"{equivalent.sets} sets of {len(equivalent.vessels)} vessel{'' if len(equivalent.vessels) == 1 else 's'}"
         )
 
 
@@ -121,11 +121,12 @@ def _print_preview(previews: Sequence[VesselPreview], lines: Sequence[dict[str, 
         f"bit-identical, {counts['moved']} would change, {counts['gone']} would be withdrawn without replacement, "
         f"{counts['new']} would be new."
     )
-    for one in previews:
-        if one.logs_otherwise:
-            names = ", ".join(one.logs_otherwise[:_NAMED]) + (" ..." if one.logs_otherwise[_NAMED:] else "")
+    for outcome in previews:
+        if outcome.logs_otherwise:
+            names = ", ".join(outcome.logs_otherwise[:_NAMED]) + (" ..." if outcome.logs_otherwise[_NAMED:] else "")
             click.echo(
-                f"{one.vessel}: in {len(one.logs_otherwise)} of {one.logs} logs other things are read or found: {names}"
+                f"{outcome.vessel}: in {len(outcome.logs_otherwise)} of {outcome.logs} logs other things are read "
+                f"or found: {names}"
             )
     if lines:
         head = ["vessel", "parameter", "largest change in s.e.", "median", "s.e. ratio", "before", "after", "unit"]

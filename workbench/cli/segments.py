@@ -53,24 +53,24 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(listed.documents)
         return
-    found = listed.found
-    short = short_ids(segment.segment_id for segment in found)
-    zigzags = [segment for segment in found if segment.is_zigzag]
+    segments = listed.found
+    short = short_ids(segment.segment_id for segment in segments)
+    zigzags = [segment for segment in segments if segment.is_zigzag]
     if zigzags:
         _print_zigzags(zigzags, short)
     else:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
-    for segment, document in zip(found, listed.documents, strict=True):
+    for segment, document in zip(segments, listed.documents, strict=True):
         if segment.excluded is not None:
             click.echo(f"{short[segment.segment_id]} is excluded: {one_line(segment.excluded)}")
         for words in document["marks"]:
             click.echo(f"{short[segment.segment_id]}: {words}")
-    for segment in found:
+    for segment in segments:
         if not segment.is_zigzag:
             _print_other(segment, short[segment.segment_id])
-    for one in {document["ingest_id"]: document for document in listed.documents}.values():
-        for words in one["channels"]:
-            click.echo(f"warning: {one_line(one['log'])}: {one_line(words)}")
+    for log in {document["ingest_id"]: document for document in listed.documents}.values():
+        for words in log["channels"]:
+            click.echo(f"warning: {one_line(log['log'])}: {one_line(words)}")
 
 
 def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None:

@@ -60,42 +60,44 @@ def command(
 
     require_figures(figure, code="cannot_write")
     request = SteerRequest(set_id, wrong, speed, LawSettings(method=method), leg_s=60.0 * minutes, seed=seed)
-    done = steer_vessel(Warehouse(uri), vessel, request)
+    outcome = steer_vessel(Warehouse(uri), vessel, request)
     if figure is not None:
-        _draw(done, figure)
+        _draw(outcome, figure)
     if as_json:
-        print_json(_show(done, figure))
+        print_json(_show(outcome, figure))
     else:
-        _print_steered(done, figure, verbose=verbose)
+        _print_steered(outcome, figure, verbose=verbose)
 
 
-def _draw(done: Steered, figure: Path) -> None:
+def _draw(outcome: Steered, figure: Path) -> None:
     from kempf.workbench.figures.course_keeping import draw_course_keeping
 
     labels = ["from the set", "from wrong parameters"]
-    tracks = [(label, tried.track) for label, tried in zip(labels, done.laws, strict=False)]
+    tracks = [(label, tried.track) for label, tried in zip(labels, outcome.laws, strict=False)]
     with writing(figure):
-        draw_course_keeping(tracks, figure, f"{done.ship.parameter_set.vessel} at {number(done.ship.speed_m_s)} m/s")
+        draw_course_keeping(
+            tracks, figure, f"{outcome.ship.parameter_set.vessel} at {number(outcome.ship.speed_m_s)} m/s"
+        )
 
 
-def _show(done: Steered, figure: Path | None) -> dict[str, Any]:
-    wind = done.request.environment
+def _show(outcome: Steered, figure: Path | None) -> dict[str, Any]:
+    wind = outcome.request.environment
     return {
-        "vessel": done.ship.parameter_set.vessel,
-        "parameter_set_id": done.ship.parameter_set.parameter_set_id,
-        "speed_m_s": done.ship.speed_m_s,
+        "vessel": outcome.ship.parameter_set.vessel,
+        "parameter_set_id": outcome.ship.parameter_set.parameter_set_id,
+        "speed_m_s": outcome.ship.speed_m_s,
         "track": {
-            "leg_s": done.request.leg_s,
-            "settle_s": done.request.settle_s,
-            "course_change_deg": degrees(done.request.change_rad),
-            "seed": done.request.seed,
+            "leg_s": outcome.request.leg_s,
+            "settle_s": outcome.request.settle_s,
+            "course_change_deg": degrees(outcome.request.change_rad),
+            "seed": outcome.request.seed,
             "wind_force_m_s2": {"mean": wind.wind_force.mean, "std": wind.wind_force.std},
             "current_m_s": {"north": wind.current_north.mean, "east": wind.current_east.mean},
         },
-        "laws": [_law(tried) for tried in done.laws],
-        "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in done.ship.effect_parameters},
+        "laws": [_law(tried) for tried in outcome.laws],
+        "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in outcome.ship.effect_parameters},
         "figure": str(figure) if figure else None,
-        "warnings": list(done.warnings),
+        "warnings": list(outcome.warnings),
     }
 
 
@@ -137,10 +139,10 @@ def _law(tried: Tried) -> dict[str, Any]:
     }
 
 
-def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None:
+def _print_steered(outcome: Steered, figure: Path | None, *, verbose: bool) -> None:
     from kempf.workbench.ranked_warnings import show_warnings
 
-    shown = [_law(tried) for tried in done.laws]
+    shown = [_law(tried) for tried in outcome.laws]
     rows = [
         (
             f"{key.removesuffix('_deg').replace('_', ' ')}, deg" if key.endswith("_deg") else _WORDS.get(key, key),
@@ -152,17 +154,17 @@ def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None
     ]
     cells = [[name, *(_cell(tried[group][key], key) for tried in shown)] for name, group, key in rows]
     head = ["", "from the set", "from wrong parameters"][: len(shown) + 1]
-    about = f"{done.ship.parameter_set.vessel}, {done.ship.parameter_set.parameter_set_id}"
-    print_table(head, cells, f"{about} at {number(done.ship.speed_m_s)} m/s, {shown[0]['law']['method']}")
+    about = f"{outcome.ship.parameter_set.vessel}, {outcome.ship.parameter_set.parameter_set_id}"
+    print_table(head, cells, f"{about} at {number(outcome.ship.speed_m_s)} m/s, {shown[0]['law']['method']}")
     if len(shown) > 1:
         click.echo(f"  wrong: {shown[1]['parameters']}")
     gains = ", ".join(f"{name} {number(-gain)}" for name, gain in shown[0]["law"]["gain"].items() if gain)
     click.echo(f"  rudder order in rad from the set: {gains} (SI), every {number(shown[0]['law']['step_s'])} s")
-    for p in done.ship.effect_parameters:
+    for p in outcome.ship.effect_parameters:
         click.echo(f"  effect: {p.name} {number(p.value)} ± {number(p.std, 2)} {p.unit} (1 s.e.)")
     if figure is not None:
         click.echo(f"  drawn: {figure}")
-    show_warnings(done.warnings, verbose=verbose)
+    show_warnings(outcome.warnings, verbose=verbose)
 
 
 _ROWS = {

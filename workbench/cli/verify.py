@@ -24,12 +24,12 @@ def command(uri: str, as_json: bool) -> None:
     from kempf.warehouse.verify import verify
 
     with progress_bar() as progress:
-        found = verify(Warehouse(uri), lambda what: progress(0, 1, what))
+        problems = verify(Warehouse(uri), lambda what: progress(0, 1, what))
     if as_json:
-        print_json([one.show() for one in found])
+        print_json([problem.show() for problem in problems])
     else:
-        for one in found:
-            click.echo(one_line(one.words))
-        click.echo(f"{counted(len(found), 'problem')}; next: kempf repair" if found else "all is well")
-    if found:
+        for problem in problems:
+            click.echo(one_line(problem.words))
+        click.echo(f"{counted(len(problems), 'problem')}; next: kempf repair" if problems else "all is well")
+    if problems:
         sys.exit(DataRejected.exit_code)

@@ -89,9 +89,9 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     vessels.require(warehouse, name)
     held = logs.current(warehouse, name)
     confirm(what_goes(of_logs(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
-    found = remove_vessel(warehouse, name, reason)
+    following = remove_vessel(warehouse, name, reason)
     if as_json:
-        print_json({"vessel": name, "removed": True, "following": found.show() if found else None})
+        print_json({"vessel": name, "removed": True, "following": following.show() if following else None})
     else:
         click.echo(f"{name}: removed")
 

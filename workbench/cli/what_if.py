@@ -27,9 +27,9 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
     from kempf.warehouse.store import Warehouse
 
     with progress_bar() as progress:
-        found = what_if(Warehouse(uri), vessel, parameter, set_id, segment_id, progress)
+        answer = what_if(Warehouse(uri), vessel, parameter, set_id, segment_id, progress)
     if as_json:
-        print_json(found.show())
+        print_json(answer.show())
         return
     rows = [
         [
@@ -38,11 +38,11 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
             number(t.log_likelihood_falls_by, 3),
             number(t.free_run_error_percent, 3),
         ]
-        for t in found.tried
+        for t in answer.tried
     ]
     print_table(
-        [f"{parameter}, {found.unit}", "standard errors away", "log-likelihood falls by", "free-run error, %"],
+        [f"{parameter}, {answer.unit}", "standard errors away", "log-likelihood falls by", "free-run error, %"],
         rows,
-        f"{found.parameter_set.parameter_set_id} of {vessel}, {found.run.segment.segment_id} run freely",
+        f"{answer.parameter_set.parameter_set_id} of {vessel}, {answer.run.segment.segment_id} run freely",
     )
     print_paragraph("the other parameters are held: fitted anew beside it, a value costs less")

@@ -75,9 +75,9 @@ def examined(kind: Comparable, occasion_h: float | None = None) -> Examined:
     settings = ChangeSettings()
     if occasion_h is not None:
         settings = replace(settings, occasion_s=3600.0 * occasion_h)
-    found = find_changes(series, settings)
+    changes = find_changes(series, settings)
     ids = tuple(name for name, ok in zip(kind.parameter_set_ids, good, strict=True) if ok)
-    return Examined(kind, series, found, ids, left_out)
+    return Examined(kind, series, changes, ids, left_out)
 
 
 def changes_document(vessel: str, of: History, changes: list[dict[str, Any]]) -> dict[str, Any]:

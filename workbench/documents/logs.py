@@ -59,14 +59,14 @@ def listed_logs(warehouse: Warehouse, vessel: str | None) -> ListedLogs:
         vessels.require(warehouse, vessel)
     rows = logs.current(warehouse, vessel)
     gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows])
-    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
+    examined = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
     documents = [
         {
             **facts_of(row),
             "partial": row.ingest_id in gone,
             "lost": lost_as_json(gone.get(row.ingest_id, ())),
-            "notes": _notes(row, said.get(row.ingest_id)),
-            "channels": _verdict(said.get(row.ingest_id)),
+            "notes": _notes(row, examined.get(row.ingest_id)),
+            "channels": _verdict(examined.get(row.ingest_id)),
         }
         for row in rows
     ]
@@ -75,8 +75,12 @@ def listed_logs(warehouse: Warehouse, vessel: str | None) -> ListedLogs:
 
 def log_document(warehouse: Warehouse, row: LogRow) -> dict[str, Any]:
     """Return one log with all that the channel doctor found in it; ``channels`` is None where it never looked."""
-    seen = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel]).get(row.ingest_id)
-    return {**facts_of(row), "notes": _notes(row, seen), "channels": dict(seen.content) if seen else None}
+    examination = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel]).get(row.ingest_id)
+    return {
+        **facts_of(row),
+        "notes": _notes(row, examination),
+        "channels": dict(examination.content) if examination else None,
+    }
 
 
 def _notes(row: LogRow, examination: StoredExamination | None) -> list[str]:

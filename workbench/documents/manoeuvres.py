@@ -31,15 +31,15 @@ def listed_manoeuvres(warehouse: Warehouse, vessel: str | None) -> ListedManoeuv
     warehouse.require()
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
     # another process may read a log anew between the two questions
-    found = [segment for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in names]
-    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
+    manoeuvres = [segment for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in names]
+    examined = examinations.of_ingests(warehouse, [segment.ingest_id for segment in manoeuvres])
     against = marks(warehouse, vessel)
     documents = [
         {
-            **one.show(names[one.ingest_id]),
-            "channels": list(said[one.ingest_id].findings) if one.ingest_id in said else [],
-            "marks": against.get(one.segment_id, []),
+            **segment.show(names[segment.ingest_id]),
+            "channels": list(examined[segment.ingest_id].findings) if segment.ingest_id in examined else [],
+            "marks": against.get(segment.segment_id, []),
         }
-        for one in found
+        for segment in manoeuvres
     ]
-    return ListedManoeuvres(found, documents)
+    return ListedManoeuvres(manoeuvres, documents)

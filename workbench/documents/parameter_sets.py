@@ -20,13 +20,13 @@ def listed_sets(warehouse: Warehouse, vessel: str | None) -> list[dict[str, Any]
     if vessel is not None:
         vessels.require(warehouse, vessel)
     # a pooled set begins with its first manoeuvre: it comes behind that manoeuvre's own, whatever their ids
-    known = parameter_sets.summaries(warehouse, vessel)
-    found = known.sort("vessel", "start_utc_ns", "estimator", "parameter_set_id").rows(named=True)
+    summaries = parameter_sets.summaries(warehouse, vessel)
+    rows = summaries.sort("vessel", "start_utc_ns", "estimator", "parameter_set_id").rows(named=True)
     pointed: dict[str, list[str]] = {}
-    for name in sorted({row["vessel"] for row in found}):
+    for name in sorted({row["vessel"] for row in rows}):
         for alias, target in aliases.of_vessel(warehouse, name).items():
             pointed.setdefault(target, []).append(alias)
     return [
         {**row, "start": iso_utc(row["start_utc_ns"]), "aliases": pointed.get(row["parameter_set_id"], [])}
-        for row in found
+        for row in rows
     ]

@@ -9,8 +9,8 @@ from typing import Any
 def refits(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Return the refits of what `kempf effects try --json` prints, with how many manoeuvres each improves."""
     sets = [*document["sets"], *document["immaterial"], *document["stand_ins"]]
-    found = [refit for one in sets for refit in one["refits"]] + list(document["refused"])
-    return [{"why": "", **one, **_better(one)} for one in found]
+    rows = [refit for group in sets for refit in group["refits"]] + list(document["refused"])
+    return [{"why": "", **refit, **_better(refit)} for refit in rows]
 
 
 def _better(refit: Mapping[str, Any]) -> dict[str, int]:

@@ -54,7 +54,7 @@ def _draw(panel: Any, shown: AddedVariable) -> None:
 
 def describe_added_variable(shown: Sequence[AddedVariable]) -> str:
     """Return the figure in words."""
-    slopes = "; ".join(f"{one.title}, slope {one.slope:.2f}" for one in shown)
+    slopes = "; ".join(f"{variable.title}, slope {variable.slope:.2f}" for variable in shown)
     return (
         "What is left of the whitened innovations against what the effect would explain of them, both without what the "
         f"fitted parameters can imitate; a slope of 1 is the expected size: {slopes}."

@@ -31,13 +31,13 @@ def pairs(correlations: Mapping[str, Any]) -> Pairs:
     correlations : mapping
         Of `kempf.pipeline.compare.correlations.correlations`.
     """
-    found: Pairs = {}
+    by_pair: Pairs = {}
     for channel in _ORDER:
         if channel not in correlations:
             continue
         every = {"itself": correlations[channel]["auto"], **correlations[channel]["cross"]}
-        found |= {(channel, name): one for name, one in every.items() if one["lag_s"]}
-    return found
+        by_pair |= {(channel, name): correlation for name, correlation in every.items() if correlation["lag_s"]}
+    return by_pair
 
 
 def draw_correlations(
@@ -63,20 +63,20 @@ def draw_correlations(
         for row, channel in zip(panels, rows, strict=True):
             row[0].set_ylabel(channel.replace("_", " "))
             for panel, other in zip(row, columns, strict=True):
-                one = last.get((channel, other))
-                if one is None:
+                correlation = last.get((channel, other))
+                if correlation is None:
                     panel.set_visible(False)
                     continue
-                panel.axhspan(-one["band"], one["band"], color=BAND, lw=0, label="band of 99 %")
+                panel.axhspan(-correlation["band"], correlation["band"], color=BAND, lw=0, label="band of 99 %")
                 panel.axhline(0.0, color=INK, lw=0.5)
                 if improved and (channel, other) in first:
                     plain = first[channel, other]
                     panel.plot(plain["lag_s"], plain["rho"], color=PLAIN, lw=0.9, ls="--", label=first_model)
                 label, colour = (last_model, FULL) if improved else (first_model, PLAIN)
-                panel.plot(one["lag_s"], one["rho"], color=colour, lw=0.9, label=label)
+                panel.plot(correlation["lag_s"], correlation["rho"], color=colour, lw=0.9, label=label)
         for panel, other in zip(panels[0], columns, strict=True):
             panel.set_title(WORDS[other])
-        largest = max(abs(one["largest"]) for one in (*first.values(), *last.values()))
+        largest = max(abs(correlation["largest"]) for correlation in (*first.values(), *last.values()))
         panels[0, 0].set_ylim(-max(0.15, 1.08 * largest), max(0.15, 1.08 * largest))
         figure.supxlabel("by how much the innovation comes later, s", fontsize=9)
         handles, labels = panels[0, 0].get_legend_handles_labels()
@@ -92,11 +92,11 @@ def describe_correlations(after: Mapping[str, Any]) -> str:
     after : mapping
         Of the last model.
     """
-    found = pairs(after)
-    worst = sorted(found, key=lambda key: (-found[key]["outside"] / len(found[key]["lag_s"]), key))[:3]
+    by_pair = pairs(after)
+    worst = sorted(by_pair, key=lambda key: (-by_pair[key]["outside"] / len(by_pair[key]["lag_s"]), key))[:3]
     words = "; ".join(
-        f"{channel.replace('_', ' ')} with {WORDS[other]}, {found[channel, other]['outside']} of "
-        f"{len(found[channel, other]['lag_s'])}"
+        f"{channel.replace('_', ' ')} with {WORDS[other]}, {by_pair[channel, other]['outside']} of "
+        f"{len(by_pair[channel, other]['lag_s'])}"
         for channel, other in worst
     )
     return (

@@ -17,13 +17,13 @@ def draw_coverage(manoeuvres: Sequence[ManoeuvreEvidence]) -> Any:
         figure = new_figure(3.4)
         left, right = figure.subplots(1, 2)
         for held, colour, marker, label in ((False, PLAIN, "o", "fitted"), (True, FULL, "x", "held out")):
-            chosen = [one for one in manoeuvres if one.held_out is held]
+            chosen = [manoeuvre for manoeuvre in manoeuvres if manoeuvre.held_out is held]
             look = {"ls": "", "marker": marker, "ms": 2.6, "color": colour, "alpha": 0.6, "rasterized": True}
             look["mew"] = 0.6 if held else 0.0
-            for k, one in enumerate(chosen):
+            for k, manoeuvre in enumerate(chosen):
                 words = f"{label} ({len(chosen)})" if k == 0 else None
-                left.plot(np.degrees(one.turn), one.drift, label=words, **look)
-                right.plot(np.degrees(one.rudder), one.speed, label=words, **look)
+                left.plot(np.degrees(manoeuvre.turn), manoeuvre.drift, label=words, **look)
+                right.plot(np.degrees(manoeuvre.rudder), manoeuvre.speed, label=words, **look)
         left.set_xlabel("yaw rate r, deg/s")
         left.set_ylabel("lateral speed v, m/s")
         left.set_title("motion")

@@ -38,11 +38,11 @@ def draw_effects(ranked: Sequence[EffectRow]) -> Any:
         widest = 0.0
         for y, (row, colour) in enumerate(zip(shown, colours, strict=True)):
             # one row an effect: parameters beside each other a little apart
-            made = [change for change in row.changes if np.isfinite(change.std) and change.std > 0.0]
-            for k, change in enumerate(made):
+            changes = [change for change in row.changes if np.isfinite(change.std) and change.std > 0.0]
+            for k, change in enumerate(changes):
                 z = float(np.clip(change.value / change.std, -_WIDEST, _WIDEST))
                 widest = max(widest, abs(z) + 2.5)
-                shift = 0.0 if len(made) == 1 else 0.22 - 0.44 * k
+                shift = 0.0 if len(changes) == 1 else 0.22 - 0.44 * k
                 bars = {"xerr": _WIDTH_95, "fmt": "o", "ms": 4, "ecolor": INK, "elinewidth": 1, "capsize": 2}
                 size.errorbar([z], [y + shift], color=colour, **bars)
                 side = -1 if z > 0.0 else 1

@@ -164,7 +164,7 @@ def _with_variables(svg: bytes) -> bytes:
     """Return an SVG whose named colours follow the page, dark or light; on paper it is light."""
     names = {colour: f"--c{number}" for number, colour in enumerate(_DARK)}
     light = "".join(f"{name}:{colour};" for colour, name in names.items())
-    dark = "".join(f"{names[colour]}:{other};" for colour, other in _DARK.items())
+    dark = "".join(f"{names[colour]}:{shade};" for colour, shade in _DARK.items())
     for colour, name in names.items():
         svg = svg.replace(colour.encode(), f"var({name})".encode())
     sheet = f"<style>:root{{{light}}}@media screen and (prefers-color-scheme:dark){{:root{{{dark}}}}}</style>"

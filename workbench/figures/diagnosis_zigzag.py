@@ -21,12 +21,12 @@ def limits(imo: Mapping[str, Any]) -> dict[int, float]:
     imo : mapping
         The criteria as a segment has them.
     """
-    found = {}
+    by_place = {}
     for name, criterion in imo.items():
         for words, place in _PLACES.items():
             if name.endswith(words) and criterion.get("limit_deg") is not None:
-                found[place] = float(criterion["limit_deg"])
-    return found
+                by_place[place] = float(criterion["limit_deg"])
+    return by_place
 
 
 def draw_zigzag(shown: ManoeuvreEvidence, psi0_deg: float, allowed: Mapping[int, float], first: str, last: str) -> Any:
@@ -89,5 +89,5 @@ def describe_zigzag(shown: ManoeuvreEvidence, label: str) -> str:
         Of the manoeuvre.
     """
     overshoots = ", ".join(f"{peak.beyond_deg:.1f}" for peak in shown.peaks)
-    said = f" Measured overshoots beyond the nominal heading, degrees: {overshoots}." if overshoots else ""
-    return f"{label}: heading, measured and predicted in free run, and rudder in time.{said}"
+    sentence = f" Measured overshoots beyond the nominal heading, degrees: {overshoots}." if overshoots else ""
+    return f"{label}: heading, measured and predicted in free run, and rudder in time.{sentence}"

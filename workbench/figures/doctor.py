@@ -27,7 +27,7 @@ _TURNS = {
 _POINTS = 2000
 
 
-def draw(found: ExaminedLog, path: Path) -> None:
+def draw(examined_log: ExaminedLog, path: Path) -> None:
     """Draw an examination.
 
     Parameters
@@ -35,11 +35,13 @@ def draw(found: ExaminedLog, path: Path) -> None:
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
     """
-    rows = [(outcome, figure) for outcome in found.examination.outcomes for figure in outcome.figures]
-    corrected = found.log
-    for finding in found.examination.findings:
+    rows = [(outcome, figure) for outcome in examined_log.examination.outcomes for figure in outcome.figures]
+    corrected = examined_log.log
+    for finding in examined_log.examination.findings:
         corrected = finding.faults[0].corrected(corrected) if finding.faults else corrected
-    sides = [("as logged", found.log)] + ([("corrected", corrected)] if corrected is not found.log else [])
+    sides = [("as logged", examined_log.log)] + (
+        [("corrected", corrected)] if corrected is not examined_log.log else []
+    )
     height = 0.24 * max(len(rows), 1) + 1.0
     sheet = pyplot().figure(figsize=(12, height + 7.5), layout="constrained")
     upper, lower = np.asarray(sheet.subfigures(2, 1, height_ratios=[height, 7.5]))
@@ -51,7 +53,7 @@ def draw(found: ExaminedLog, path: Path) -> None:
         _speeds(panels[2, column], log)
         panels[0, column].set_title(title)
         panels[2, column].set_xlabel("time, s")
-    sheet.suptitle(f"{found.file_name}: {found.examination.verdict}")
+    sheet.suptitle(f"{examined_log.file_name}: {examined_log.examination.verdict}")
     save(sheet, path, 110)
 
 
@@ -86,22 +88,22 @@ def _line(panel: Axes, origin: int, time: Nanoseconds, value: Float, label: str,
 
 
 def _origin(log: Log) -> int:
-    return min((int(one.time_utc_ns[0]) for one in log.series.values()), default=0)
+    return min((int(series.time_utc_ns[0]) for series in log.series.values()), default=0)
 
 
 def _turns(panel: Axes, log: Log) -> None:
     origin = _origin(log)
-    known: dict[str, tuple[Nanoseconds, Float]] = {}
+    angles: dict[str, tuple[Nanoseconds, Float]] = {}
     if "heading" in log.series:
-        known["heading"] = (log.series["heading"].time_utc_ns, log.series["heading"].value)
+        angles["heading"] = (log.series["heading"].time_utc_ns, log.series["heading"].value)
     if "yaw_rate" in log.series:
         turned = integral(log.series["yaw_rate"])
-        known["rate"] = (turned.time_utc_ns, turned.value)
+        angles["rate"] = (turned.time_utc_ns, turned.value)
     for kind in ("course", "earth"):
         velocity = log.velocity(kind)
         if velocity is not None:
-            known[kind] = (velocity.time_utc_ns[velocity.under_way], velocity.direction[velocity.under_way])
-    for kind, (time, value) in known.items():
+            angles[kind] = (velocity.time_utc_ns[velocity.under_way], velocity.direction[velocity.under_way])
+    for kind, (time, value) in angles.items():
         if value.size:
             _line(panel, origin, time, np.rad2deg(value - (value[0] if kind == "rate" else 0.0)), _TURNS[kind])
     panel.set_ylabel("turned, deg")
@@ -112,8 +114,8 @@ def _rudder(panel: Axes, log: Log) -> None:
     origin = _origin(log)
     for name in ("rudder_order", "rudder_angle"):
         if name in log.series:
-            one = log.series[name]
-            _line(panel, origin, one.time_utc_ns, np.rad2deg(one.value), name.replace("_", " "))
+            series = log.series[name]
+            _line(panel, origin, series.time_utc_ns, np.rad2deg(series.value), name.replace("_", " "))
     panel.set_ylabel("rudder, deg")
     _finish(panel)
 
@@ -125,8 +127,8 @@ def _speeds(panel: Axes, log: Log) -> None:
         if velocity is not None:
             _line(panel, origin, velocity.time_utc_ns, np.abs(velocity.value), label)
     if "speed_through_water" in log.series:
-        one = log.series["speed_through_water"]
-        _line(panel, origin, one.time_utc_ns, one.value, "through the water")
+        series = log.series["speed_through_water"]
+        _line(panel, origin, series.time_utc_ns, series.value, "through the water")
     panel.set_ylabel("speed, m/s")
     _finish(panel)
 

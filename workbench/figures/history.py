@@ -13,12 +13,12 @@ from kempf.pipeline.history.sets import ParameterHistory
 from kempf.workbench.figures.drawn import pyplot, save
 
 
-def draw_history(history: ParameterHistory, found: Changes, path: Path, title: str) -> None:
+def draw_history(history: ParameterHistory, changes: Changes, path: Path, title: str) -> None:
     """Draw one panel a parameter: sets with 2 standard errors, scatter between trials, steps and drifts.
 
     Parameters
     ----------
-    found : Changes
+    changes : Changes
         Of it.
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
@@ -36,11 +36,11 @@ def draw_history(history: ParameterHistory, found: Changes, path: Path, title: s
     span = np.linspace(0.0, 1.0, 400) * float((history.time_utc_ns[-1] - history.time_utc_ns[0]) or 1)
     fine: Nanoseconds = history.time_utc_ns[0] + span.astype(np.int64)
     for j, panel in enumerate(axes.flat[:p]):
-        for k, change in enumerate(found.changes):
+        for k, change in enumerate(changes.changes):
             _mark(panel, change, j, first=k == 0)
-        level = _level(found, fine, j)
-        if np.isfinite(found.scatter[j]):
-            band = 2.0 * found.scatter[j]
+        level = _level(changes, fine, j)
+        if np.isfinite(changes.scatter[j]):
+            band = 2.0 * changes.scatter[j]
             panel.fill_between(fine.astype("datetime64[ns]"), level - band, level + band, color="0.88", lw=0)
         panel.plot(fine.astype("datetime64[ns]"), level, color="tab:blue", lw=1.4, label="level")
         panel.errorbar(time, history.value[:, j], 2 * std[:, j], fmt="o", ms=3.5, lw=1, color="black", capsize=2)
@@ -76,12 +76,12 @@ def _mark(panel: object, change: Change, j: int, *, first: bool) -> None:
     panel.axvline(middle, label="change" if first else None, **style)  # type: ignore[attr-defined]
 
 
-def _level(found: Changes, time: Nanoseconds, j: int) -> Float:
+def _level(changes: Changes, time: Nanoseconds, j: int) -> Float:
     """Return what the changes found say the parameter was, shape (n,)."""
-    if not found.changes:
-        return np.full(time.size, found.mean[j])
-    level = np.full(time.size, found.changes[0].before[j])
-    for change in found.changes:
+    if not changes.changes:
+        return np.full(time.size, changes.mean[j])
+    level = np.full(time.size, changes.changes[0].before[j])
+    for change in changes.changes:
         first, last = change.between_utc_ns
         if change.kind == "step":
             after = time >= (first + last) // 2

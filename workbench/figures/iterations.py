@@ -25,11 +25,11 @@ def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value]
         Above the figure.
     """
     count = [entry["iteration"] for entry in iterations]
-    found = [[*entry["A"][0], *entry["A"][1], *entry["B"]] for entry in iterations]
+    estimates = [[*entry["A"][0], *entry["A"][1], *entry["B"]] for entry in iterations]
     figure, axes = pyplot().subplots(3, 2, figsize=(10, 8), sharex=True, layout="constrained")
     for k, (panel, true) in enumerate(zip(axes.flat, truth, strict=True)):
         panel.axhline(true.value, color="black", lw=1.2, label="true")
-        panel.plot(count, [values[k] for values in found], "o-", ms=3, lw=1.0, color="tab:blue", label="estimated")
+        panel.plot(count, [values[k] for values in estimates], "o-", ms=3, lw=1.0, color="tab:blue", label="estimated")
         panel.set_ylabel(f"{true.name}, {true.unit}")
         panel.grid(lw=0.3)
     handles, labels = axes[0, 0].get_legend_handles_labels()

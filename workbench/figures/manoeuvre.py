@@ -18,7 +18,7 @@ from kempf.workbench.figures.drawn import save
 _SHIPS = 96
 
 
-def draw_manoeuvre(made: Prediction, path: Path, title: str = "") -> None:
+def draw_manoeuvre(prediction: Prediction, path: Path, title: str = "") -> None:
     """Draw a prediction.
 
     Parameters
@@ -29,33 +29,33 @@ def draw_manoeuvre(made: Prediction, path: Path, title: str = "") -> None:
         Above the figure.
     """
     with style():
-        figure = new_figure(6.4 if isinstance(made.manoeuvre, TurningCircle) else 4.2)
+        figure = new_figure(6.4 if isinstance(prediction.manoeuvre, TurningCircle) else 4.2)
         figure.set_facecolor("white")
         panel = figure.subplots()
         figure.suptitle(title, x=0.02, ha="left", fontsize=9.5)
-        if isinstance(made.manoeuvre, TurningCircle):
-            _circle(panel, made)
-        elif isinstance(made.manoeuvre, Zigzag):
-            _zigzag(panel, made, made.manoeuvre)
-        elif isinstance(made.manoeuvre, Spiral):
-            _spiral(panel, made)
+        if isinstance(prediction.manoeuvre, TurningCircle):
+            _circle(panel, prediction)
+        elif isinstance(prediction.manoeuvre, Zigzag):
+            _zigzag(panel, prediction, prediction.manoeuvre)
+        elif isinstance(prediction.manoeuvre, Spiral):
+            _spiral(panel, prediction)
         else:
-            _pull_out(panel, made)
+            _pull_out(panel, prediction)
         handles, labels = panel.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3)
         save(figure, path, 110)
 
 
-def _ships(panel: Any, made: Prediction, x: int, y: int, factors: tuple[float, float]) -> None:
+def _ships(panel: Any, prediction: Prediction, x: int, y: int, factors: tuple[float, float]) -> None:
     """Draw ships of all models thinly, evenly chosen, and the one of the estimates over them."""
-    drawn = made.drawn
+    drawn = prediction.drawn
     chosen = drawn[:: max(1, len(drawn) // _SHIPS)]
-    for k, one in enumerate(chosen):
+    for k, ship in enumerate(chosen):
         label = "ships that the data allow" if k == 0 else None
         panel.plot(
-            factors[0] * one.curve[:, x], factors[1] * one.curve[:, y], color=FULL, alpha=0.12, lw=1.0, label=label
+            factors[0] * ship.curve[:, x], factors[1] * ship.curve[:, y], color=FULL, alpha=0.12, lw=1.0, label=label
         )
-    for k, model in enumerate(made.models):
+    for k, model in enumerate(prediction.models):
         if model.sailed is not None:
             curve = model.sailed.curve
             style_of = {"color": INK, "lw": 1.6} if k == 0 else {"color": LIMIT, "lw": 1.0, "ls": "--"}
@@ -72,9 +72,9 @@ def _bar(panel: Any, figure: Any, place: float, *, across: bool) -> None:
     panel.plot(ends if across else both, both if across else ends, color=LIMIT, lw=3.0, solid_capstyle="butt")
 
 
-def _circle(panel: Any, made: Prediction) -> None:
-    _ships(panel, made, 1, 0, (1.0, 1.0))
-    figures = made.figures
+def _circle(panel: Any, prediction: Prediction) -> None:
+    _ships(panel, prediction, 1, 0, (1.0, 1.0))
+    figures = prediction.figures
     advance, diameter, transfer = (figures[n] for n in ("advance_m", "tactical_diameter_m", "transfer_m"))
     for figure, words, across in ((advance, "advance", False), (diameter, "tactical diameter", True)):
         if figure.value is None:
@@ -95,17 +95,17 @@ def _circle(panel: Any, made: Prediction) -> None:
     panel.set_ylabel("along the approach, m")
 
 
-def _zigzag(panel: Any, made: Prediction, manoeuvre: Zigzag) -> None:
+def _zigzag(panel: Any, prediction: Prediction, manoeuvre: Zigzag) -> None:
     nominal = np.degrees(manoeuvre.heading_rad)
     panel.axhline(0.0, color=INK, lw=0.5)
     for side in (-1, 1):
         panel.axhline(side * nominal, color=FAINT, lw=0.8, ls=":")
-    curve = made.sailed.curve
+    curve = prediction.sailed.curve
     panel.plot(curve[:, 0], np.degrees(curve[:, 2]), color=FAINT, lw=1.1, label="rudder")
-    _ships(panel, made, 0, 1, (1.0, np.degrees(1.0)))
+    _ships(panel, prediction, 0, 1, (1.0, np.degrees(1.0)))
     heading = np.degrees(curve[:, 1])
     for k in range(manoeuvre.overshoots):
-        figure = made.figures[f"overshoots_deg.{k}"]
+        figure = prediction.figures[f"overshoots_deg.{k}"]
         side = manoeuvre.side * (-1) ** k
         if figure.value is None:
             continue
@@ -126,29 +126,32 @@ def _zigzag(panel: Any, made: Prediction, manoeuvre: Zigzag) -> None:
     panel.set_ylabel("heading from the base course and rudder, deg")
 
 
-def _pull_out(panel: Any, made: Prediction) -> None:
+def _pull_out(panel: Any, prediction: Prediction) -> None:
     panel.axhline(0.0, color=INK, lw=0.5)
-    _ships(panel, made, 0, 1, (1.0, np.degrees(1.0)))
-    left = made.figures["residual_yaw_rate_deg_s"]
-    _bar(panel, left, float(made.sailed.curve[-1, 0]), across=False)
+    _ships(panel, prediction, 0, 1, (1.0, np.degrees(1.0)))
+    left = prediction.figures["residual_yaw_rate_deg_s"]
+    _bar(panel, left, float(prediction.sailed.curve[-1, 0]), across=False)
     panel.plot([], [], color=LIMIT, lw=3.0, label="95 % interval of what is left")
     panel.set_xlabel("time from the order amidships, s")
     panel.set_ylabel("yaw rate, deg/s")
 
 
-def _spiral(panel: Any, made: Prediction) -> None:
+def _spiral(panel: Any, prediction: Prediction) -> None:
     panel.axhline(0.0, color=INK, lw=0.5)
     panel.axvline(0.0, color=INK, lw=0.5)
-    _ships(panel, made, 0, 1, (np.degrees(1.0), np.degrees(1.0)))
-    assert isinstance(made.manoeuvre, Spiral)
+    _ships(panel, prediction, 0, 1, (np.degrees(1.0), np.degrees(1.0)))
+    assert isinstance(prediction.manoeuvre, Spiral)
     for name, marker, words in (
         ("from_starboard_deg_s", "v", "direct spiral, from starboard"),
         ("from_port_deg_s", "^", "direct spiral, from port"),
     ):
-        there = [(np.degrees(o), made.figures[f"{name}.{k}"].value) for k, o in enumerate(made.manoeuvre.orders_rad)]
-        seen = [(o, value) for o, value in there if value is not None]
-        panel.plot(*zip(*seen, strict=True), marker=marker, ls="", ms=4.5, color=LIMIT, label=words)
-    farthest = 1.05 * np.degrees(made.manoeuvre.rudder_rad)
+        there = [
+            (np.degrees(o), prediction.figures[f"{name}.{k}"].value)
+            for k, o in enumerate(prediction.manoeuvre.orders_rad)
+        ]
+        points = [(o, value) for o, value in there if value is not None]
+        panel.plot(*zip(*points, strict=True), marker=marker, ls="", ms=4.5, color=LIMIT, label=words)
+    farthest = 1.05 * np.degrees(prediction.manoeuvre.rudder_rad)
     panel.set_xlim(-farthest, farthest)
     panel.set_xlabel("rudder, deg")
     panel.set_ylabel("steady yaw rate, deg/s")

@@ -62,20 +62,20 @@ def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
 
 
 def _panel(panel: Any, run: ComparedRun, name: str) -> None:
-    one, i = run.predicted, CHANNELS.index(name)
+    prediction, i = run.predicted, CHANNELS.index(name)
     unit, factor = UNITS[name]
     measured = factor * run.looked.filtered.run.measured[:, i]
-    made = np.isfinite(measured)
-    panel.plot(one.time_s[made], measured[made], color="0.55", lw=2.2, label="measured")
-    predicted = factor * one.predicted[:, i]
-    if np.isfinite(one.std[:, i]).any():
-        width = factor * WIDTH_95 * one.std[:, i]
+    known = np.isfinite(measured)
+    panel.plot(prediction.time_s[known], measured[known], color="0.55", lw=2.2, label="measured")
+    predicted = factor * prediction.predicted[:, i]
+    if np.isfinite(prediction.std[:, i]).any():
+        width = factor * WIDTH_95 * prediction.std[:, i]
         style = {"color": _PREDICTED, "alpha": 0.25, "lw": 0, "label": "95 % interval of the prediction"}
-        panel.fill_between(one.time_s, predicted - width, predicted + width, **style)
+        panel.fill_between(prediction.time_s, predicted - width, predicted + width, **style)
         # while the initial state is not known the prediction is no statement
-        predicted = np.where(np.isfinite(one.error[:, i]), predicted, np.nan)
-    panel.plot(one.time_s, predicted, color=_PREDICTED, lw=1.0, label="predicted")
-    fit = one.fit_percent().get(name)
+        predicted = np.where(np.isfinite(prediction.error[:, i]), predicted, np.nan)
+    panel.plot(prediction.time_s, predicted, color=_PREDICTED, lw=1.0, label="predicted")
+    fit = prediction.fit_percent().get(name)
     if fit is not None:
         panel.set_title(f"fit {fit:.1f} %", fontsize=8)
     panel.set_ylabel(f"{_NAMES[name]}, {unit}", fontsize=8)
@@ -85,11 +85,11 @@ def _panel(panel: Any, run: ComparedRun, name: str) -> None:
 
 def _strip(strip: Any, run: ComparedRun, name: str) -> None:
     """Draw measured less predicted, with its interval where the model gives one."""
-    one, i = run.predicted, CHANNELS.index(name)
-    error, width = (UNITS[name][1] * column for column in (one.error[:, i], WIDTH_95 * one.std[:, i]))
+    prediction, i = run.predicted, CHANNELS.index(name)
+    error, width = (UNITS[name][1] * column for column in (prediction.error[:, i], WIDTH_95 * prediction.std[:, i]))
     if np.isfinite(width).any():
-        strip.fill_between(one.time_s, -width, width, color=_PREDICTED, alpha=0.25, lw=0)
-    strip.plot(one.time_s, error, color="black", lw=0.7)
+        strip.fill_between(prediction.time_s, -width, width, color=_PREDICTED, alpha=0.25, lw=0)
+    strip.plot(prediction.time_s, error, color="black", lw=0.7)
     known = error[np.isfinite(error)]
     if known.size:
         # one wild reading must not flatten the rest

@@ -30,6 +30,6 @@ def as_html(title: str, sentences: Sequence[str], frames: Sequence[pl.DataFrame]
     if picture is not None:
         data = b64encode(picture).decode("ascii")
         drawn = f'<img alt="{html.escape(title)}" src="data:image/png;base64,{data}"/>'
-    said = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
+    paragraphs = "".join(f"<p>{html.escape(sentence)}</p>" for sentence in sentences)
     tables = "".join(frame._repr_html_() for frame in frames)
-    return f"<figure><figcaption>{html.escape(title)}</figcaption>{drawn}</figure>{said}{tables}"
+    return f"<figure><figcaption>{html.escape(title)}</figcaption>{drawn}</figure>{paragraphs}{tables}"

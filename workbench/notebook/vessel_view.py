@@ -46,8 +46,8 @@ class VesselView:
         from kempf.warehouse import logs, segments
 
         files = {row.ingest_id: row.file_name for row in logs.current(self.warehouse, self.name)}
-        found = segments.current(self.warehouse, self.name)
-        rows = [{**vars(s), "log": files[s.ingest_id]} for s in found if s.ingest_id in files]
+        manoeuvres = segments.current(self.warehouse, self.name)
+        rows = [{**vars(s), "log": files[s.ingest_id]} for s in manoeuvres if s.ingest_id in files]
         return frame_of(rows, _SEGMENT)
 
     def identify(self, model: str | os.PathLike[str] | None = None, estimator: str = "ml") -> pl.DataFrame:
@@ -147,13 +147,13 @@ class VesselView:
 
         segments.get(self.warehouse, segment_id)
         view = self.compare(set_id, horizon)
-        found = view.series.filter(segment_id=segment_id)
-        if found.is_empty():
+        series = view.series.filter(segment_id=segment_id)
+        if series.is_empty():
             why = view.comparison.skipped.get(segment_id, f"it is no zigzag of {self.name!r}")
             raise DataRejected(
                 "nothing_to_compare", f"{segment_id} is not predicted: {why}.", "Predict another zigzag.", {}
             )
-        return found
+        return series
 
     def diagnose(self) -> DiagnosisView:
         """Find which physical effect the plain model of eq. (16) lacks, and say how sure that is."""
@@ -202,15 +202,15 @@ class VesselView:
 
 
 def _parameters(
-    found: ParameterSet | None, segment_ids: Sequence[str], error: KempfError | str | None = None
+    parameter_set: ParameterSet | None, segment_ids: Sequence[str], error: KempfError | str | None = None
 ) -> list[dict[str, Any]]:
     """Return one row a parameter of a set, or one that says why there is no set."""
-    if found is None:
+    if parameter_set is None:
         return [{"segment_ids": segment_ids, "error": str(error)}]
     common = {
-        "parameter_set_id": found.parameter_set_id,
-        "estimator": found.estimator,
+        "parameter_set_id": parameter_set.parameter_set_id,
+        "estimator": parameter_set.estimator,
         "segment_ids": segment_ids,
-        "converged": found.convergence.get("converged"),
+        "converged": parameter_set.convergence.get("converged"),
     }
-    return [{**common, **vars(parameter), "parameter": parameter.name} for parameter in found.parameters]
+    return [{**common, **vars(parameter), "parameter": parameter.name} for parameter in parameter_set.parameters]

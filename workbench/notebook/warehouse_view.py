@@ -37,8 +37,8 @@ def open_warehouse(uri: str | os.PathLike[str] | None = None) -> WarehouseView:
     UsageError
         ``warehouse_path``, ``configuration_invalid``.
     """
-    given = configured_warehouse() if uri is None else uri
-    return WarehouseView(Warehouse(os.fspath(given)))
+    address = configured_warehouse() if uri is None else uri
+    return WarehouseView(Warehouse(os.fspath(address)))
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ class WarehouseView:
         from kempf.flows.jobs.files import read_profiles
         from kempf.flows.jobs.ingest_logs import ingest
 
-        given = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+        files = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
         profiles = None if profile is None else read_profiles([Path(profile)])
-        outcomes = ingest(self.warehouse, [Path(path) for path in given], vessel, profiles)
+        outcomes = ingest(self.warehouse, [Path(path) for path in files], vessel, profiles)
         failed = [outcome.error for outcome in outcomes if outcome.error is not None]
         if failed and len(failed) == len(outcomes):
             raise failed[0]

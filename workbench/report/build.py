@@ -64,7 +64,11 @@ def make_report(
     included = () if current is None else tuple(current.model_spec["effects"])
     profile = vessels.get(warehouse, chosen.profile_sha256)
     examined = examinations.of_ingests(warehouse, [segment.ingest_id for segment in chosen.segments])
-    channels = {"channels": {one.log_id: one.findings for one in examined.values() if one.findings}}
+    channels = {
+        "channels": {
+            examination.log_id: examination.findings for examination in examined.values() if examination.findings
+        }
+    }
     content = content_of(
         vessel,
         stored.content,
@@ -107,9 +111,9 @@ def content_of(
     """
     segments = {segment.segment_id: segment for segment in chosen.segments}
     shown = []
-    for number, one in enumerate(evidence.manoeuvres, start=1):
-        segment = segments[one.segment_id]
-        start = iso_utc(one.start_utc_ns)[:16].replace("T", " ")
+    for number, manoeuvre in enumerate(evidence.manoeuvres, start=1):
+        segment = segments[manoeuvre.segment_id]
+        start = iso_utc(manoeuvre.start_utc_ns)[:16].replace("T", " ")
         shown.append(
             ShownManoeuvre(
                 number=number,
@@ -117,7 +121,7 @@ def content_of(
                 log=chosen.file_names[segment.log_id],
                 psi0_deg=segment.psi0_deg,
                 imo=segment.imo,
-                evidence=one,
+                evidence=manoeuvre,
             )
         )
     return ReportContent(

@@ -34,8 +34,8 @@ def chart_of(shown: ManoeuvreEvidence, label: str, picture: PictureBlock) -> Cha
         if not np.isfinite(measured).any():
             continue
         series[name] = measured
-        for kind, one in zip(("predicted",) if len(models) == 1 else ("before", "predicted"), models, strict=True):
-            series[f"{name}:{kind}"] = one.free_run[:, i]
+        for kind, model in zip(("predicted",) if len(models) == 1 else ("before", "predicted"), models, strict=True):
+            series[f"{name}:{kind}"] = model.free_run[:, i]
     begin, end = shown.start_utc_ns, shown.start_utc_ns + round(float(shown.time_s[-1]) * SECOND_NS)
     frame = encoded(begin, end, {name: _whole(shown.time_s, values) for name, values in series.items()})
     logged = [name for name in (_RUDDER, "heading", "yaw_rate") if name in series]

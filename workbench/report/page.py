@@ -69,7 +69,7 @@ def _static(name: str) -> str:
 
 @cache
 def _templates() -> Environment:
-    made = Environment(
+    environment = Environment(
         loader=ChoiceLoader(
             [
                 PackageLoader("kempf.workbench.report", "templates"),
@@ -81,7 +81,7 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters["base64"] = lambda content: b64encode(content).decode("ascii")
-    made.filters["data_uri"] = lambda svg: f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"
-    made.filters["words"] = words
-    return made
+    environment.filters["base64"] = lambda content: b64encode(content).decode("ascii")
+    environment.filters["data_uri"] = lambda svg: f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"
+    environment.filters["words"] = words
+    return environment

@@ -47,15 +47,15 @@ def _models(content: ReportContent) -> tuple[str, ...]:
 
 
 def _held_out_first(content: ReportContent) -> list[ShownManoeuvre]:
-    return sorted(content.manoeuvres, key=lambda one: not one.evidence.held_out)
+    return sorted(content.manoeuvres, key=lambda manoeuvre: not manoeuvre.evidence.held_out)
 
 
 def effects(content: ReportContent) -> list[Block]:
     """Ranked effects, and the whole catalogue as a table."""
     first = content.wording.first_model
-    made: list[Block] = []
+    blocks: list[Block] = []
     if any(row.tested for row in content.effects):
-        made.append(
+        blocks.append(
             _picture(
                 diagnosis_effects.draw_effects(content.effects),
                 diagnosis_effects.describe_effects(content.effects, first),
@@ -64,7 +64,7 @@ def effects(content: ReportContent) -> list[Block]:
         )
     head = ("effect", "set", "verdict", "score", "p", "expected size ± 1 s.e.", "absorption", "why")
     rows = [_effect_row(row) for row in content.effects]
-    return [*made, TableBlock("All effects of the catalogue, by score", head, rows, numeric=(3, 4, 6))]
+    return [*blocks, TableBlock("All effects of the catalogue, by score", head, rows, numeric=(3, 4, 6))]
 
 
 def _effect_row(row: EffectRow) -> tuple[str, ...]:
@@ -92,7 +92,7 @@ def parameters(content: ReportContent) -> list[Block]:
     """Parameters of the first model and of the last, with their standard errors."""
     models = content.evidence.models
     shown = (models[0], models[-1]) if content.evidence.improved else (models[0],)
-    values = [{one.name: with_error(one.value, one.std, one.unit) for one in model.parameters} for model in shown]
+    values = [{p.name: with_error(p.value, p.std, p.unit) for p in model.parameters} for model in shown]
     rows = [(name, *(column.get(name, "-") for column in values)) for name in values[-1]]
     head = ("parameter", *(f"{name}, ± 1 s.e." for name in _models(content)))
     unsure = [name for name, model in zip(_models(content), shown, strict=True) if not model.converged]
@@ -143,34 +143,35 @@ def _caveats(content: ReportContent) -> list[Block]:
 def prediction(content: ReportContent) -> list[Block]:
     """Measured over predicted, held-out manoeuvres first, and fit % at every horizon."""
     first, last = content.wording.first_model, content.wording.last_model
-    made: list[Block] = [_fit_table(content)]
-    for one in _held_out_first(content):
-        made += [
-            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+    blocks: list[Block] = [_fit_table(content)]
+    for manoeuvre in _held_out_first(content):
+        blocks += [
+            HeadingBlock(manoeuvre.label, SampleBadge(manoeuvre.evidence.held_out)),
             chart_of(
-                one.evidence,
-                one.label,
+                manoeuvre.evidence,
+                manoeuvre.label,
                 _picture(
-                    diagnosis_overlay.draw_overlay(one.evidence, first, last),
-                    diagnosis_overlay.describe_overlay(one.evidence, one.label, first, last),
-                    f"{one.short}, measured (dots) over predicted, horizon free run, with the rudder: "
-                    f"by the {last} (line){f', by the {first} (dashed)' if one.evidence.after is not None else ''}.",
+                    diagnosis_overlay.draw_overlay(manoeuvre.evidence, first, last),
+                    diagnosis_overlay.describe_overlay(manoeuvre.evidence, manoeuvre.label, first, last),
+                    f"{manoeuvre.short}, measured (dots) over predicted, horizon free run, with the rudder: "
+                    f"by the {last} (line)"
+                    f"{f', by the {first} (dashed)' if manoeuvre.evidence.after is not None else ''}.",
                 ),
             ),
         ]
-    return made
+    return blocks
 
 
 def _fit_table(content: ReportContent) -> TableBlock:
-    every = [fits for one in content.manoeuvres for fits in one.evidence.before.fit_percent.values()]
+    every = [fits for manoeuvre in content.manoeuvres for fits in manoeuvre.evidence.before.fit_percent.values()]
     channels = [name for name in _CHANNELS if any(name in fits for fits in every)]
     head = ["manoeuvre", "sample", "horizon"]
     head += [f"{_CHANNELS[name]}, {model}" for name in channels for model in _models(content)]
     rows: list[list[Cell]] = []
-    for one in _held_out_first(content):
-        predicted = [each for each in (one.evidence.before, one.evidence.after) if each is not None]
-        for horizon in one.evidence.before.fit_percent:
-            row: list[Cell] = [one.short, SampleBadge(one.evidence.held_out), horizon]
+    for manoeuvre in _held_out_first(content):
+        predicted = [each for each in (manoeuvre.evidence.before, manoeuvre.evidence.after) if each is not None]
+        for horizon in manoeuvre.evidence.before.fit_percent:
+            row: list[Cell] = [manoeuvre.short, SampleBadge(manoeuvre.evidence.held_out), horizon]
             for name in channels:
                 fits = [each.fit_percent.get(horizon, {}).get(name) for each in predicted]
                 row += ["" if fit is None else f"{fit:.1f}" for fit in fits]
@@ -181,17 +182,17 @@ def _fit_table(content: ReportContent) -> TableBlock:
 def innovations(content: ReportContent) -> list[Block]:
     """One-step errors of all manoeuvres in time."""
     first, last = content.wording.first_model, content.wording.last_model
-    made: list[Block] = []
-    for one in content.manoeuvres:
-        made += [
-            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+    blocks: list[Block] = []
+    for manoeuvre in content.manoeuvres:
+        blocks += [
+            HeadingBlock(manoeuvre.label, SampleBadge(manoeuvre.evidence.held_out)),
             _picture(
-                diagnosis_strip.draw_strip(one.evidence, first, last),
-                diagnosis_strip.describe_strip(one.evidence, one.label, first, last),
-                f"{one.short}, whitened innovations, horizon one step.",
+                diagnosis_strip.draw_strip(manoeuvre.evidence, first, last),
+                diagnosis_strip.describe_strip(manoeuvre.evidence, manoeuvre.label, first, last),
+                f"{manoeuvre.short}, whitened innovations, horizon one step.",
             ),
         ]
-    return made
+    return blocks
 
 
 def where(content: ReportContent) -> list[Block]:
@@ -205,25 +206,25 @@ def where(content: ReportContent) -> list[Block]:
             row += [_rms(places.before[group][name]), _rms(last)] if content.evidence.improved else [_rms(last)]
             rows.append([*row, f"{last['band'][0]:.2f} to {last['band'][1]:.2f}", "outside" if last["outside"] else ""])
     head = ["by", "group", "innovations", *_models(content), "band", "outside"]
-    made: list[Block] = [TableBlock("Whitened innovations, root mean square", head, rows, range(2, len(head) - 2))]
+    blocks: list[Block] = [TableBlock("Whitened innovations, root mean square", head, rows, range(2, len(head) - 2))]
     standing = [
         (
-            *(one["of"].removeprefix("by_").replace("_", " "), one["which"].replace("_", " ")),
-            *(one["channel"].replace("_", " "), str(one["n"]), _rms(one), _p_value(one["p_adjusted"])),
+            *(place["of"].removeprefix("by_").replace("_", " "), place["which"].replace("_", " ")),
+            *(place["channel"].replace("_", " "), str(place["n"]), _rms(place), _p_value(place["p_adjusted"])),
         )
-        for one in places.after.get("stands_out", ())
+        for place in places.after.get("stands_out", ())
     ]
     if standing:
         head = ["by", "group", "channel", "innovations", "rms", "p"]
         caption = f"Groups with the largest one-step errors under the {content.wording.last_model}"
-        made.append(TableBlock(caption, head, standing, (3, 4, 5)))
+        blocks.append(TableBlock(caption, head, standing, (3, 4, 5)))
     else:
-        made.append(TextBlock("No phase, side, manoeuvre or bin stands out under the last model."))
-    return [*made, _worst(content)]
+        blocks.append(TextBlock("No phase, side, manoeuvre or bin stands out under the last model."))
+    return [*blocks, _worst(content)]
 
 
 def _names(content: ReportContent) -> dict[str, str]:
-    return {one.evidence.segment_id: one.short for one in content.manoeuvres}
+    return {manoeuvre.evidence.segment_id: manoeuvre.short for manoeuvre in content.manoeuvres}
 
 
 def _rms(group: Mapping[str, Any]) -> str:
@@ -233,17 +234,17 @@ def _rms(group: Mapping[str, Any]) -> str:
 def _worst(content: ReportContent) -> TableBlock:
     names, rows = _names(content), []
     for places, held in ((content.evidence.misfit.held_out, True), (content.evidence.misfit.after, False)):
-        for one in places.get("worst", ())[:10]:
+        for window in places.get("worst", ())[:10]:
             size = (
-                f"{one['whitened_rms']:.1f} standard deviations"
-                if one["measure"] == "one step"
-                else f"{one['free_run_rms']:.3g} {one['unit']}"
+                f"{window['whitened_rms']:.1f} standard deviations"
+                if window["measure"] == "one step"
+                else f"{window['free_run_rms']:.3g} {window['unit']}"
             )
             rows.append(
                 (
-                    *(names[one["run"]], SampleBadge(held), one["measure"]),
-                    *(one["channel"].replace("_", " "), (one["phase"] or "").replace("_", " ")),
-                    *(f"{one['start_s']:.0f} to {one['end_s']:.0f}", _clock(one["start"]), size),
+                    *(names[window["run"]], SampleBadge(held), window["measure"]),
+                    *(window["channel"].replace("_", " "), (window["phase"] or "").replace("_", " ")),
+                    *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", _clock(window["start"]), size),
                 )
             )
     head = ("manoeuvre", "sample", "horizon", "channel", "phase", "time, s", "begins, UTC", "rms error")
@@ -268,10 +269,10 @@ def correlations(content: ReportContent) -> list[Block]:
     picture = _picture(drawn, diagnosis_correlations.describe_correlations(after), caption)
     first, last = diagnosis_correlations.pairs(before), diagnosis_correlations.pairs(after)
     rows = []
-    for key, one in last.items():
-        row = [key[0].replace("_", " "), diagnosis_correlations.WORDS[key[1]], str(len(one["lag_s"]))]
-        row += [str(first[key]["outside"]), str(one["outside"])] if improved else [str(one["outside"])]
-        rows.append([*row, f"{one['largest']:+.3f} at {one['largest_lag_s']:.0f} s", f"{one['band']:.3f}"])
+    for key, pair in last.items():
+        row = [key[0].replace("_", " "), diagnosis_correlations.WORDS[key[1]], str(len(pair["lag_s"]))]
+        row += [str(first[key]["outside"]), str(pair["outside"])] if improved else [str(pair["outside"])]
+        rows.append([*row, f"{pair['largest']:+.3f} at {pair['largest_lag_s']:.0f} s", f"{pair['band']:.3f}"])
     outside = [f"outside, {model}" for model in _models(content)]
     head = ["innovation of", "with", "lags", *outside, "largest", "band"]
     return [picture, TableBlock("Lags outside the band", head, rows, numeric=range(2, len(head)))]
@@ -296,7 +297,7 @@ def confusion(content: ReportContent) -> list[Block]:
     confused = content.evidence.confusion
     if len(confused.titles) < 2:
         return []
-    made: list[Block] = [
+    blocks: list[Block] = [
         _picture(
             diagnosis_confusion.draw_confusion(confused),
             diagnosis_confusion.describe_confusion(confused),
@@ -304,17 +305,17 @@ def confusion(content: ReportContent) -> list[Block]:
         )
     ]
     rows = []
-    for one in content.sets:
-        for name in one["effects"]:
+    for group in content.sets:
+        for name in group["effects"]:
             candidate = content.evidence.candidates[name]
             sizes = "; ".join(
                 f"{p.name.rpartition('.')[2]} = {with_error(p.value, p.std, p.unit)}" for p in candidate.refitted
             )
-            rows.append((one["set_id"], name.replace("_", " "), sizes, candidate.separated_by))
+            rows.append((group["set_id"], name.replace("_", " "), sizes, candidate.separated_by))
     if rows:
         head = ("set", "effect", "refitted, ± 1 s.e.", "distinguished by")
-        made.append(TableBlock("Effects that the refit confirmed, by confusion set", head, rows))
-    return made
+        blocks.append(TableBlock("Effects that the refit confirmed, by confusion set", head, rows))
+    return blocks
 
 
 def unmodelled(content: ReportContent) -> list[Block]:
@@ -334,7 +335,7 @@ def coverage(content: ReportContent) -> list[Block]:
     """Coverage maps."""
     return [
         _picture(
-            diagnosis_coverage.draw_coverage([one.evidence for one in content.manoeuvres]),
+            diagnosis_coverage.draw_coverage([manoeuvre.evidence for manoeuvre in content.manoeuvres]),
             diagnosis_coverage.describe_coverage(content.evidence.ranges),
             "Motion, rudder and speed of all manoeuvres.",
         )
@@ -344,32 +345,32 @@ def coverage(content: ReportContent) -> list[Block]:
 def zigzags(content: ReportContent) -> list[Block]:
     """Draw the manoeuvres; list overshoots measured and predicted, and the criteria of zigzags."""
     first, last = content.wording.first_model, content.wording.last_model
-    made: list[Block] = []
-    for one in content.manoeuvres:
-        allowed = diagnosis_zigzag.limits(one.imo)
-        made += [
-            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+    blocks: list[Block] = []
+    for manoeuvre in content.manoeuvres:
+        allowed = diagnosis_zigzag.limits(manoeuvre.imo)
+        blocks += [
+            HeadingBlock(manoeuvre.label, SampleBadge(manoeuvre.evidence.held_out)),
             _picture(
-                diagnosis_zigzag.draw_zigzag(one.evidence, one.psi0_deg, allowed, first, last),
-                diagnosis_zigzag.describe_zigzag(one.evidence, one.label),
-                f"{one.short}: heading from the base course, measured and predicted in free run, and rudder.",
+                diagnosis_zigzag.draw_zigzag(manoeuvre.evidence, manoeuvre.psi0_deg, allowed, first, last),
+                diagnosis_zigzag.describe_zigzag(manoeuvre.evidence, manoeuvre.label),
+                f"{manoeuvre.short}: heading from the base course, measured and predicted in free run, and rudder.",
             ),
-            *_overshoots(content, one),
+            *_overshoots(content, manoeuvre),
         ]
     rows = []
-    for one in content.manoeuvres:
-        for name, criterion in one.imo.items():
-            said = {True: "met", False: "not met", None: "not applicable"}[criterion.get("passed")]
+    for manoeuvre in content.manoeuvres:
+        for name, criterion in manoeuvre.imo.items():
+            result = {True: "met", False: "not met", None: "not applicable"}[criterion.get("passed")]
             value, limit = _degrees(criterion.get("value_deg")), _degrees(criterion.get("limit_deg"))
-            rows.append((one.short, name, value, limit, said, criterion.get("why") or ""))
+            rows.append((manoeuvre.short, name, value, limit, result, criterion.get("why") or ""))
     head = ("manoeuvre", "criterion", "measured, deg", "limit, deg", "result", "why not")
     if not rows:
-        return made
-    return [*made, TableBlock("Criteria of IMO resolution MSC.137(76), 5.3.3", head, rows, numeric=(2, 3))]
+        return blocks
+    return [*blocks, TableBlock("Criteria of IMO resolution MSC.137(76), 5.3.3", head, rows, numeric=(2, 3))]
 
 
-def _overshoots(content: ReportContent, one: ShownManoeuvre) -> list[Block]:
-    predicted = [each.overshoots for each in (one.evidence.before, one.evidence.after) if each is not None]
+def _overshoots(content: ReportContent, manoeuvre: ShownManoeuvre) -> list[Block]:
+    predicted = [each.overshoots for each in (manoeuvre.evidence.before, manoeuvre.evidence.after) if each is not None]
     measured = next((pairs for pairs in predicted if pairs), ())
     rows = []
     for k, pair in enumerate(measured):
@@ -379,7 +380,7 @@ def _overshoots(content: ReportContent, one: ShownManoeuvre) -> list[Block]:
     if not rows:
         return []
     head = ("overshoot", "side", "measured, deg", *(f"{name}, deg" for name in _models(content)))
-    caption = f"{one.short}: overshoots, measured and predicted in free run"
+    caption = f"{manoeuvre.short}: overshoots, measured and predicted in free run"
     return [TableBlock(caption, head, rows, numeric=(0, *range(2, len(head))))]
 
 
@@ -391,7 +392,10 @@ def provenance(content: ReportContent) -> list[Block]:
     """List inputs, versions and settings."""
     rows = list(content.provenance)
     rows += [
-        (f"{one.short}, {SampleBadge(one.evidence.held_out).text}", f"{one.evidence.segment_id} of {one.log}")
-        for one in content.manoeuvres
+        (
+            f"{manoeuvre.short}, {SampleBadge(manoeuvre.evidence.held_out).text}",
+            f"{manoeuvre.evidence.segment_id} of {manoeuvre.log}",
+        )
+        for manoeuvre in content.manoeuvres
     ]
     return [TableBlock("Inputs, versions and settings", ("what", "which"), rows)]

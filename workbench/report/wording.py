@@ -81,8 +81,8 @@ def wording_of(
         Names of the effects that the vessel's current model has already.
     """
     verdict = str(content["verdict"])
-    given = evidence.models[0].effects
-    first = f"model with {listed(given)}" if given else "plain model"
+    effects = evidence.models[0].effects
+    first = f"model with {listed(effects)}" if effects else "plain model"
     last = ("model with effects" if verdict in CLAIMING else "model with effects tried") if evidence.improved else first
     return ReportWording(
         verdict=verdict,
@@ -150,7 +150,7 @@ def _next_steps(
 
 def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) -> dict[str, SectionWords]:
     claims, improved = verdict in CLAIMING, evidence.improved
-    fitted = sum(not one.held_out for one in evidence.manoeuvres)
+    fitted = sum(not manoeuvre.held_out for manoeuvre in evidence.manoeuvres)
     coloured = (
         "Coloured: effects that the refit confirmed; those of one colour and one set cannot be distinguished."
         if claims

@@ -50,7 +50,7 @@ def vessel_at(warehouse: Warehouse, segment: str) -> str:
     return segment
 
 
-def address_of(warehouse: Warehouse, asked: str) -> str:
+def address_of(warehouse: Warehouse, query: str) -> str:
     """Return the address of what a person typed: an id, its beginning, or the name of a vessel or an effect.
 
     Raises
@@ -60,7 +60,7 @@ def address_of(warehouse: Warehouse, asked: str) -> str:
     """
     from kempf.schemas.effects import catalogue
 
-    text = asked.strip()
+    text = query.strip()
     if text in vessels.names(warehouse):
         return of_vessel(text)
     if text in catalogue():
@@ -70,6 +70,6 @@ def address_of(warehouse: Warehouse, asked: str) -> str:
             return begin + text
     raise NotFound(
         "nothing_of_this_name",
-        f"{asked[:100]!r} is neither a vessel, an effect, nor the id of a log, manoeuvre, parameter set or diagnosis.",
+        f"{query[:100]!r} is neither a vessel, an effect, nor the id of a log, manoeuvre, parameter set or diagnosis.",
         "Ids begin with seg-, ps- or dx-, a log's is a hash; the fleet's page lists the vessels.",
     )

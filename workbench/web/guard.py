@@ -94,22 +94,22 @@ class Guard:
             )
         return None
 
-    def _knows(self, given: str | None) -> bool:
-        if self._token is None or given is None:
+    def _knows(self, token: str | None) -> bool:
+        if self._token is None or token is None:
             return False
-        return hmac.compare_digest(given.encode(), self._token.encode())
+        return hmac.compare_digest(token.encode(), self._token.encode())
 
     def _exchanged(self, request: Request) -> Response | None:
         """Give the cookie for the token of the start address, and take the token out of the address."""
-        given = request.query_params.get("token")
-        if given is None:
+        token = request.query_params.get("token")
+        if token is None:
             return None
         left = urlencode([(key, value) for key, value in request.query_params.multi_items() if key != "token"])
         # "//name" would be another server's address
         path = "/" + request.url.path.lstrip("/")
         to = RedirectResponse(path + (f"?{left}" if left else ""), status_code=303)
-        if self._knows(given):
-            to.set_cookie(COOKIE, given, httponly=True, samesite="strict")
+        if self._knows(token):
+            to.set_cookie(COOKIE, token, httponly=True, samesite="strict")
         return to
 
 

@@ -21,13 +21,13 @@ def contents() -> dict[str, tuple[bytes, str]]:
 
 
 def _below(folder: Traversable, begin: str) -> list[tuple[str, tuple[bytes, str]]]:
-    found = []
-    for one in folder.iterdir():
-        if one.is_dir():
-            found += _below(one, f"{begin}{one.name}/")
-        elif (kind := one.name.rpartition(".")[2]) in _TYPES:
-            found.append((begin + one.name, (one.read_bytes(), _TYPES[kind])))
-    return found
+    entries = []
+    for entry in folder.iterdir():
+        if entry.is_dir():
+            entries += _below(entry, f"{begin}{entry.name}/")
+        elif (kind := entry.name.rpartition(".")[2]) in _TYPES:
+            entries.append((begin + entry.name, (entry.read_bytes(), _TYPES[kind])))
+    return entries
 
 
 def serve(app: FastAPI) -> None:

@@ -26,7 +26,7 @@ def words(name: str) -> str:
 
 @cache
 def _templates() -> Environment:
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("kempf.workbench.web", "templates"),
         autoescape=True,
         undefined=StrictUndefined,
@@ -43,5 +43,5 @@ def _templates() -> Environment:
         "undoing": undoing,
         "refits": refits,
     }
-    made.filters |= filters
-    return made
+    environment.filters |= filters
+    return environment

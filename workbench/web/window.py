@@ -27,14 +27,14 @@ def instant(text: str) -> int:
             raise ValueError
         plain = text.removesuffix("Z").replace(" ", "T")
         datetime.fromisoformat(plain[:19]).replace(tzinfo=UTC)  # numpy takes less for an instant than this
-        found = np.datetime64(plain, "ns")
+        moment = np.datetime64(plain, "ns")
     except ValueError:
         raise UsageError(
             "instant_unreadable",
             f"{text[:60]!r} is no instant; expected UTC as 2025-05-03T07:47:01.5Z.",
             "Take the times out of the address to see everything.",
         ) from None
-    return int(found.astype(np.int64))
+    return int(moment.astype(np.int64))
 
 
 def window(asked_from: str | None, asked_to: str | None, start_utc_ns: int, end_utc_ns: int) -> tuple[int, int]:

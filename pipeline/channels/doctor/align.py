@@ -63,10 +63,10 @@ def edges_of(*series: Series, window_s: float = 0.0) -> Nanoseconds:
     window_s : float, optional
         Shortest window, s; never shorter than five periods of the slowest, nor more than six hundred of them.
     """
-    start = max(int(one.time_utc_ns[0]) for one in series)
-    end = min(int(one.time_utc_ns[-1]) for one in series)
+    start = max(int(channel.time_utc_ns[0]) for channel in series)
+    end = min(int(channel.time_utc_ns[-1]) for channel in series)
     span = (end - start) / SECOND_NS
-    window = max(window_s, span / _WINDOWS, *(5.0 * one.period_s for one in series))
+    window = max(window_s, span / _WINDOWS, *(5.0 * channel.period_s for channel in series))
     count = int(span / window) if end > start else 0
     return np.linspace(0, max(end - start, 0), count + 1).astype(np.int64) + start
 
@@ -114,20 +114,20 @@ def align(
     common = _left_over(np.sum(sums, axis=0))
     honest = (lags >= usual_s[0] - step) & (lags <= usual_s[1] + step)
     usual = float(np.min(common[honest])) if honest.any() else 1.0
-    found = (float(lags[int(np.argmin(common))]), 0.0, float(np.min(common)))
+    best = (float(lags[int(np.argmin(common))]), 0.0, float(np.min(common)))
     if honest.any():
         near = int(np.flatnonzero(honest)[np.argmin(common[honest])])
         together = np.sum(sums, axis=0)
         turned = _sense(together[int(np.argmin(common))]) != _sense(together[near])
-        if found[2] > (_FAR_BETTER if turned else _BETTER) * usual:
-            found = (float(lags[near]), 0.0, usual)
-    if found[2] > _COMMON:
+        if best[2] > (_FAR_BETTER if turned else _BETTER) * usual:
+            best = (float(lags[near]), 0.0, usual)
+    if best[2] > _COMMON:
         grown = _growing(sums, lags, span)
-        if grown[2] < _BETTER * found[2]:
-            found = grown
-    refined = _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle, rounds=_ROUNDS)
+        if grown[2] < _BETTER * best[2]:
+            best = grown
+    refined = _refined(x, second, edges, (best[0], best[1]), (best[2], usual), circle=circle, rounds=_ROUNDS)
     # beyond the lags that were looked at, a refinement has lost its way
-    return None if refined is None or abs(refined.lag_s) > longest + 3.0 * step + abs(found[1]) * span else refined
+    return None if refined is None or abs(refined.lag_s) > longest + 3.0 * step + abs(best[1]) * span else refined
 
 
 def _read_later(edges: Nanoseconds, lag: float, rate: float) -> Nanoseconds:
@@ -146,15 +146,15 @@ def _sums(x: Float, second: Series, edges: Nanoseconds, lags: Float, *, circle: 
     """Return the sums that a straight fit of each part at each lag needs, shape (parts, lags, 6)."""
     parts = min(_PARTS, max(x.size // _FEWEST, 1))
     cuts = np.linspace(0, x.size, parts + 1).astype(int)[:-1]
-    found = np.zeros((parts, lags.size, 6))
+    sums = np.zeros((parts, lags.size, 6))
     # all lags in one go: the search among the readings costs more than the sums
     later = edges[None, :] + np.rint(lags * SECOND_NS).astype(np.int64)[:, None]
     for k, y in enumerate(_changes(second, later, circle=circle)):
         good = np.isfinite(x) & np.isfinite(y)
         a, b = np.where(good, x, 0.0), np.where(good, y, 0.0)
         table = np.column_stack([good.astype(np.float64), a, b, a * a, a * b, b * b])
-        found[:, k] = np.add.reduceat(table, cuts, axis=0)
-    return found
+        sums[:, k] = np.add.reduceat(table, cuts, axis=0)
+    return sums
 
 
 def _left_over(sums: Float) -> Float:
@@ -213,33 +213,33 @@ def _refined(
     long = np.diff(edges) / SECOND_NS
     middle = edges[:-1] + np.diff(edges) // 2
     along = (middle - middle[middle.size // 2]) / SECOND_NS
-    found: RobustLine | None = None
+    line: RobustLine | None = None
     for _ in range(rounds):
         last = (lag, rate)
         at = _read_later(edges, lag, rate)
         y = _changes(second, at, circle=circle)
         slope = (second.at(at + step, gap) - second.at(at - step, gap)) / (2.0 * step / SECOND_NS)
         later = np.diff(slope)
-        found = fit(np.column_stack([x, long, later, later * along]), y)
-        if found is None:
+        line = fit(np.column_stack([x, long, later, later * along]), y)
+        if line is None:
             return None
-        lag -= float(np.clip(found.value[2], -3.0, 3.0))
-        rate = float(np.clip(rate - found.value[3], -_FASTEST, _FASTEST))
-        if abs(lag - last[0]) < 0.1 * found.std[2] and abs(rate - last[1]) < 0.1 * found.std[3]:
+        lag -= float(np.clip(line.value[2], -3.0, 3.0))
+        rate = float(np.clip(rate - line.value[3], -_FASTEST, _FASTEST))
+        if abs(lag - last[0]) < 0.1 * line.std[2] and abs(rate - last[1]) < 0.1 * line.std[3]:
             break
-    assert found is not None
+    assert line is not None
     return Alignment(
-        float(found.value[0]), float(found.std[0]), lag, float(found.std[2]), rate, float(found.std[3]),
-        found.left_over, *_as_it_is(x, y, long, found), min(left[0], found.left_over) / max(left[1], 1e-12),
+        float(line.value[0]), float(line.std[0]), lag, float(line.std[2]), rate, float(line.std[3]),
+        line.left_over, *_as_it_is(x, y, long, line), min(left[0], line.left_over) / max(left[1], 1e-12),
     )  # fmt: skip
 
 
-def _as_it_is(x: Float, y: Float, long: Float, found: RobustLine) -> tuple[float, float, float, float]:
+def _as_it_is(x: Float, y: Float, long: Float, line: RobustLine) -> tuple[float, float, float, float]:
     """Return what a fit leaves over of the changes about their mean, and slope and extent of the whole changes."""
     known = np.isfinite(x) & np.isfinite(y)
     steady = fit(long[:, None], y)
     whole = fit(x[:, None], y)
     assert steady is not None
     assert whole is not None
-    varying = min(found.left_over / max(steady.left_over, 1e-12), 1.0)
+    varying = min(line.left_over / max(steady.left_over, 1e-12), 1.0)
     return varying, float(whole.value[0]), float(whole.std[0]), abs(float(np.sum(x[known])))

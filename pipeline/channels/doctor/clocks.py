@@ -20,7 +20,7 @@ _SHORT_S = 3.0
 
 
 def clock_figures(
-    found: Alignment, lags_s: tuple[float, float], over: Series, own_s: float = 0.0
+    alignment: Alignment, lags_s: tuple[float, float], over: Series, own_s: float = 0.0
 ) -> tuple[Figure, Figure]:
     """Return the lag and its growth with what sound clocks give.
 
@@ -37,13 +37,13 @@ def clock_figures(
     # one kind of manoeuvre at the beginning and another at the end look like twice as much over the whole
     drift = (_DRIFT_S + 2.0 * own_s) / max(span, 1.0)
     return (
-        Figure("lag", found.lag_s, found.lag_std_s, *lags_s, "s"),
-        Figure("growth of the lag", found.rate, found.rate_std, -drift, drift, "s/s"),
+        Figure("lag", alignment.lag_s, alignment.lag_std_s, *lags_s, "s"),
+        Figure("growth of the lag", alignment.rate, alignment.rate_std, -drift, drift, "s/s"),
     )
 
 
 def clock_outcome(
-    name: str, sides: tuple[tuple[str, ...], tuple[str, ...]], found: Alignment, figures: tuple[Figure, Figure]
+    name: str, sides: tuple[tuple[str, ...], tuple[str, ...]], alignment: Alignment, figures: tuple[Figure, Figure]
 ) -> Outcome:
     """Judge two clocks by the lag of the second side behind the first and its growth.
 
@@ -53,17 +53,17 @@ def clock_outcome(
         Of the check.
     sides : (tuple of str, tuple of str)
         Channels of the first and of the second instrument.
-    found : Alignment
+    alignment : Alignment
         Of their motions.
     figures : (Figure, Figure)
         From `clock_figures`.
     """
     channels = (*sides[0], *sides[1])
-    if max(found.left_over, found.varying) > _TOGETHER:
+    if max(alignment.left_over, alignment.varying) > _TOGETHER:
         return untestable(name, channels, "the two motions are not correlated, so no lag can be determined")
     lag, growth = figures
     far = max(lag.low - lag.value, lag.value - lag.high)
-    if far > _SHORT_S and found.explains > _NO_BETTER:
+    if far > _SHORT_S and alignment.explains > _NO_BETTER:
         return untestable(name, channels, "no lag fits clearly better than the usual one")
     words = (
         f"lag of {' and '.join(sides[1])} behind {' and '.join(sides[0])}: {lag.value:.2f} ± {lag.std:.2g} s in the "
@@ -77,7 +77,7 @@ def clock_outcome(
         Fault("clock_scale", first, -growth.value, "clock", growth.std, simplicity=2),
     )
     state = worst([lag.state, growth.state])
-    return Outcome(name, channels, state, words, figures, found.left_over, suspects)
+    return Outcome(name, channels, state, words, figures, alignment.left_over, suspects)
 
 
 def _late(channels: tuple[str, ...], lag_s: float, std: float) -> list[Fault]:

@@ -32,8 +32,8 @@ class Correction:
     @property
     def line(self) -> str:
         """The entry as a line of YAML, what is as usual left out."""
-        given = self.mapped.model_dump(exclude_defaults=True)
-        inner = ", ".join(f"{name}: {value}" for name, value in given.items())
+        fields = self.mapped.model_dump(exclude_defaults=True)
+        inner = ", ".join(f"{name}: {value}" for name, value in fields.items())
         return f"{self.key}: {{{inner}}}"
 
 
@@ -56,9 +56,9 @@ def entries(
         Key and entry by channel.
     """
     entry: dict[str, tuple[str, ChannelMap]] = {}
-    given = source.channels if source is not None else {}
+    channels = source.channels if source is not None else {}
     for channel, instrument in instruments.items():
-        for key, mapped in given.items():
+        for key, mapped in channels.items():
             whose = log_format == "delimited" or key.startswith(instrument + ".")
             if mapped.channel == channel and whose:
                 entry[channel] = (key, mapped)
@@ -127,8 +127,8 @@ def _offset(channel: str, mapped: ChannelMap, added: float) -> float:
 def _rescaled(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:
     unit, _, taken_for = fault.name.partition(",")[0].partition(" taken for ")
     if mapped.unit == taken_for:
-        other = mapped.model_copy(update={"unit": unit})
-        return _turned(channel, other) if fault.value < 0.0 else other
+        entry = mapped.model_copy(update={"unit": unit})
+        return _turned(channel, entry) if fault.value < 0.0 else entry
     scale, offset = mapped.scale * fault.value, mapped.offset * fault.value
     return mapped.model_copy(update={"scale": float(f"{scale:.4g}"), "offset": float(f"{offset:.6g}")})
 
@@ -182,4 +182,6 @@ def put_into(source: Source | None, corrections: tuple[Correction, ...], match: 
         File pattern where there is no source yet.
     """
     held = source if source is not None else Source(match=match)
-    return held.model_copy(update={"channels": {**held.channels, **{one.key: one.mapped for one in corrections}}})
+    return held.model_copy(
+        update={"channels": {**held.channels, **{correction.key: correction.mapped for correction in corrections}}}
+    )

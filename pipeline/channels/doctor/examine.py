@@ -147,7 +147,7 @@ def examine(log: Log) -> Examination:
     first = answers = ask(log)
     original = log
     findings: list[ChannelFinding] = []
-    if any(one.distrusts_length for one in _wrong(answers).values()):
+    if any(outcome.distrusts_length for outcome in _wrong(answers).values()):
         log = replace(log, length_m=None)
         answers = ask(log)
     for _ in range(_MOST_FAULTS):
@@ -162,8 +162,8 @@ def examine(log: Log) -> Examination:
         # a corrected channel may have made the length right
         answers[CHECKS.index(plausible.examine)] = plausible.examine(replace(log, length_m=original.length_m))
     left = tuple(_wrong(answers).values())
-    findings += [ChannelFinding((), (one,)) for one in left if one.claim]
-    if compared := tuple(one for one in left if not one.claim):
+    findings += [ChannelFinding((), (outcome,)) for outcome in left if outcome.claim]
+    if compared := tuple(outcome for outcome in left if not outcome.claim):
         findings.append(ChannelFinding((), compared))
     outcomes = tuple(_by_name(first).values())
     return Examination(tuple(findings), outcomes, _untested(original, outcomes))

@@ -91,19 +91,19 @@ def _each(own: Mapping[str, Series], change: Mapping[str, Float]) -> dict[str, S
 
 
 def _sign(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
-    return _each(own, {name: -one.value for name, one in own.items()})
+    return _each(own, {name: -series.value for name, series in own.items()})
 
 
 def _unit(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
     circle = ("heading", "course_over_ground")
-    scaled = {name: one.value * fault.value for name, one in own.items()}
+    scaled = {name: series.value * fault.value for name, series in own.items()}
     return _each(own, {name: np.unwrap(value) if name in circle else value for name, value in scaled.items()})
 
 
 def _offset(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
     # "counts from east" turns the sense of rotation too: psi = 90 deg - what is read
     turn = -1.0 if fault.name.startswith("counted anticlockwise") else 1.0
-    return _each(own, {name: turn * one.value + fault.value for name, one in own.items()})
+    return _each(own, {name: turn * series.value + fault.value for name, series in own.items()})
 
 
 def _swap(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
@@ -125,14 +125,14 @@ def _moved(series: Series, time: Nanoseconds) -> Series:
 
 
 def _latency(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
-    return {name: _moved(one, one.time_utc_ns - round(fault.value * SECOND_NS)) for name, one in own.items()}
+    return {name: _moved(series, series.time_utc_ns - round(fault.value * SECOND_NS)) for name, series in own.items()}
 
 
 def _clock_scale(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
     corrected: dict[str, Series | None] = {}
-    for name, one in own.items():
-        since = (one.time_utc_ns - one.time_utc_ns[0]).astype(np.float64)
-        corrected[name] = _moved(one, one.time_utc_ns[0] + np.rint(since / (1.0 + fault.value)).astype(np.int64))
+    for name, series in own.items():
+        since = (series.time_utc_ns - series.time_utc_ns[0]).astype(np.float64)
+        corrected[name] = _moved(series, series.time_utc_ns[0] + np.rint(since / (1.0 + fault.value)).astype(np.int64))
     return corrected
 
 

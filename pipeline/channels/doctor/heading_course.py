@@ -43,12 +43,12 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 2.5: course, heading
     and crab angle.
     """
-    found: list[Outcome] = []
+    outcomes: list[Outcome] = []
     heading = log.series.get("heading")
     if heading is not None:
         for kind, velocity in log.velocities(track=thorough):
-            found += _compare(log, kind, heading, velocity, thorough=thorough)
-    return found
+            outcomes += _compare(log, kind, heading, velocity, thorough=thorough)
+    return outcomes
 
 
 def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorough: bool) -> list[Outcome]:

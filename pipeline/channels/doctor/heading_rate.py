@@ -51,14 +51,14 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         return [untestable(name, _CHANNELS, STILL) for name in names]
     if max(reach(heading.value), reach(turned.value)) < _LEAST_TURN:
         return [untestable(name, _CHANNELS, "the ship hardly turned") for name in names]
-    found = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)
-    if found is None or reach(heading.value) == 0.0:
+    alignment = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)
+    if alignment is None or reach(heading.value) == 0.0:
         # of a compass that repeats itself the check of standstills decides
         return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
     span = float(heading.time_utc_ns[-1] - heading.time_utc_ns[0]) / SECOND_NS
     return [
-        _turning(found, span, another=_of_another_ship(heading, turned)),
-        *([_clocks(log, found, (-late, late))] if thorough else []),
+        _turning(alignment, span, another=_of_another_ship(heading, turned)),
+        *([_clocks(log, alignment, (-late, late))] if thorough else []),
     ]
 
 
@@ -69,7 +69,9 @@ def _of_another_ship(heading: Series, turned: Series) -> bool:
     the turn.
     """
     edges = edges_of(heading, turned)
-    rate, shown = (np.diff(one.at(edges, gap_limit_s(one))) / (np.diff(edges) / SECOND_NS) for one in (heading, turned))
+    rate, shown = (
+        np.diff(angle.at(edges, gap_limit_s(angle))) / (np.diff(edges) / SECOND_NS) for angle in (heading, turned)
+    )
     both = np.isfinite(rate[1:]) & np.isfinite(rate[:-1])
     if not both.any():
         return False
@@ -82,17 +84,17 @@ def _of_another_ship(heading: Series, turned: Series) -> bool:
     known = np.isfinite(rate) & np.isfinite(shown)
     if not known.any():
         return False
-    x, y = (one[known] - np.mean(one[known]) for one in (rate, shown))
+    x, y = (rates[known] - np.mean(rates[known]) for rates in (rate, shown))
     return bool(np.sum(x * y) < _FOLLOWS * np.sqrt(np.sum(x**2) * np.sum(y**2)) or not np.any(y))
 
 
-def _turning(found: Alignment, span_s: float, *, another: bool) -> Outcome:
-    slope, std = found.slope, found.slope_std
-    if found.varying > _TOGETHER and not another:
+def _turning(alignment: Alignment, span_s: float, *, another: bool) -> Outcome:
+    slope, std = alignment.slope, alignment.slope_std
+    if alignment.varying > _TOGETHER and not another:
         # of a steady turn the changes about the mean are noise: the turn itself is compared, and a bias allowed for
-        if found.turned < _STEADY_TURN:
+        if alignment.turned < _STEADY_TURN:
             return untestable("heading_rate", _CHANNELS, "the two motions are not correlated")
-        slope, std = found.whole, float(np.hypot(found.whole_std, _BIAS_RAD_S * span_s / found.turned))
+        slope, std = alignment.whole, float(np.hypot(alignment.whole_std, _BIAS_RAD_S * span_s / alignment.turned))
     figure = Figure("integrated yaw rate over change of heading", slope, std, *SLOPES)
     words = f"the integrated yaw rate is {slope:.3g} ± {std:.2g} (1 s.e.) times the change of heading"
     suspects = [
@@ -104,16 +106,16 @@ def _turning(found: Alignment, span_s: float, *, another: bool) -> Outcome:
           for name, factor in UNITS["rad/s"].items()),
         *unit_faults(("heading",), "rad"),
     ]  # fmt: skip
-    if abs(slope) > 4.0 * std and found.left_over < 0.5:
+    if abs(slope) > 4.0 * std and alignment.left_over < 0.5:
         suspects.append(Fault("scale", ("yaw_rate",), 1.0 / slope, "scale", std, simplicity=3))
     state = figure.state
-    if found.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
+    if alignment.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
     # a factor of 57.3 is distinguished from one of 60 by the slope it leaves
-    left = min(found.left_over + abs(float(np.log(max(abs(slope), 1e-3)))), 1.0)
+    left = min(alignment.left_over + abs(float(np.log(max(abs(slope), 1e-3)))), 1.0)
     return Outcome("heading_rate", _CHANNELS, state, words, (figure,), left, tuple(suspects))
 
 
-def _clocks(log: Log, found: Alignment, usual_s: tuple[float, float]) -> Outcome:
-    figures = clock_figures(found, usual_s, log.series["heading"])
-    return clock_outcome("heading_rate_clock", (("heading",), ("yaw_rate",)), found, figures)
+def _clocks(log: Log, alignment: Alignment, usual_s: tuple[float, float]) -> Outcome:
+    figures = clock_figures(alignment, usual_s, log.series["heading"])
+    return clock_outcome("heading_rate_clock", (("heading",), ("yaw_rate",)), alignment, figures)

@@ -89,9 +89,9 @@ class Log:
         refused: Mapping[str, int] | None = None,
     ) -> Log:
         """Return the channels that a log has of its own; what was computed from others confirms nothing."""
-        own = {name: one for name, one in instruments.series.items() if name not in instruments.derived}
+        own = {name: series for name, series in instruments.series.items() if name not in instruments.derived}
         return cls(
-            {name: one for name, one in own.items() if len(one) > 1},
+            {name: series for name, series in own.items() if len(series) > 1},
             length_m,
             trial_speed_m_s,
             units or {},
@@ -105,7 +105,7 @@ class Log:
     def with_series(self, changed: Mapping[str, Series | None]) -> Log:
         """Return the log with some channels exchanged; None takes one out."""
         series = {**self.series, **changed}
-        return replace(self, series={name: one for name, one in series.items() if one is not None})
+        return replace(self, series={name: channel for name, channel in series.items() if channel is not None})
 
     def velocity(self, kind: str) -> Velocity | None:
         """Return a velocity over ground by a key of `VELOCITIES`, None where the log does not have both channels."""
@@ -135,28 +135,34 @@ class Log:
 
     def between(self, start_ns: int, end_ns: int) -> Log:
         """Return the log with the readings of a time only, UTC ns, both ends included."""
-        parts = {name: one.between(start_ns, end_ns) for name, one in self.series.items()}
-        return replace(self, series={name: one for name, one in parts.items() if len(one) > 1})
+        parts = {name: series.between(start_ns, end_ns) for name, series in self.series.items()}
+        return replace(self, series={name: series for name, series in parts.items() if len(series) > 1})
 
     def thinned(self, most: int) -> Log:
         """Return the log with so many readings of each channel at most, as many left out between any two of them."""
-        every = {name: max(len(one) // most, 1) for name, one in self.series.items()}
-        thin = {n: Series(one.time_utc_ns[:: every[n]], one.value[:: every[n]]) for n, one in self.series.items()}
+        every = {name: max(len(series) // most, 1) for name, series in self.series.items()}
+        thin = {
+            n: Series(series.time_utc_ns[:: every[n]], series.value[:: every[n]]) for n, series in self.series.items()
+        }
         return replace(self, series=thin)
 
     def over_ground(self, kind: str) -> Velocity | None:
         """Return a velocity in the earth's frame; a body-fixed one is turned by the heading."""
-        found = self.velocity(kind)
-        if kind != "body" or found is None:
-            return found
+        velocity = self.velocity(kind)
+        if kind != "body" or velocity is None:
+            return velocity
         heading = self.series.get("heading")
         if heading is None:
             return None
-        bow = heading.at(found.time_utc_ns, gap_limit_s(heading))
+        bow = heading.at(velocity.time_utc_ns, gap_limit_s(heading))
         known = np.isfinite(bow)
-        value = found.value[known] * np.exp(1j * bow[known])
+        value = velocity.value[known] * np.exp(1j * bow[known])
         return Velocity(
-            found.channels, found.time_utc_ns[known], value, found.direction[known] + bow[known], found.over_s
+            velocity.channels,
+            velocity.time_utc_ns[known],
+            value,
+            velocity.direction[known] + bow[known],
+            velocity.over_s,
         )
 
     def _between_fixes(self) -> Velocity | None:

@@ -60,13 +60,13 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
         return untestable(name, channels, STILL)
     if velocity.blurred(heading):
         return untestable(name, channels, "the position fixes are too coarse to resolve the turns")
-    found = _way(log, kind, heading, velocity)
-    if found is None or found.why_not:
-        return untestable(name, channels, "too few readings under way" if found is None else found.why_not)
-    angle, std = found.angle, float(np.hypot(found.own_std, _LEEWAY_RAD))
-    what = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
-    figure = Figure(what, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
-    words = f"{what} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
+    way = _way(log, kind, heading, velocity)
+    if way is None or way.why_not:
+        return untestable(name, channels, "too few readings under way" if way is None else way.why_not)
+    angle, std = way.angle, float(np.hypot(way.own_std, _LEEWAY_RAD))
+    quantity = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
+    figure = Figure(quantity, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
+    words = f"{quantity} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
     if figure.state == "disagree" and not _repeated(log, kind, heading, velocity, angle):
         return untestable(name, channels, f"{words}, but not in every stretch of the log")
     suspects = [Fault("offset", ("heading",), angle, "turned", std)]
@@ -76,11 +76,11 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
         suspects += [
             Fault("swap", velocity.channels),
             Fault("frame", velocity.channels, name=f"{'body' if kind == 'earth' else 'earth'}-fixed"),
-            *(Fault("sign", (one,)) for one in velocity.channels),
+            *(Fault("sign", (channel,)) for channel in velocity.channels),
         ]
     else:
-        suspects += [Fault("swap", velocity.channels), *(Fault("sign", (one,)) for one in velocity.channels)]
-    return Outcome(name, channels, figure.state, words, (figure,), found.left_over, tuple(suspects))
+        suspects += [Fault("swap", velocity.channels), *(Fault("sign", (channel,)) for channel in velocity.channels)]
+    return Outcome(name, channels, figure.state, words, (figure,), way.left_over, tuple(suspects))
 
 
 @dataclass(frozen=True)
@@ -98,10 +98,10 @@ class _Way:
 
 def _way(log: Log, kind: str, heading: Series, velocity: Velocity) -> _Way | None:
     """Return the way A, None for too few readings under way."""
-    seen = _seen_from_the_bow(kind, heading, velocity)
-    if seen is None:
+    sectors = _seen_from_the_bow(kind, heading, velocity)
+    if sectors is None:
         return None
-    relative, bow, rate, duration = seen
+    relative, bow, rate, duration = sectors
     speed = quantile(np.abs(relative), 0.5)
     fast = max(quantile(np.abs(rate), 0.95), 1e-6)
     prior = np.array([np.inf, np.inf, *[stream_std(log, speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
@@ -137,11 +137,11 @@ def _repeated(log: Log, kind: str, heading: Series, velocity: Velocity, angle: f
             continue
         own = replace(velocity, time_utc_ns=velocity.time_utc_ns[part], value=velocity.value[part],
                       direction=velocity.direction[part])  # fmt: skip
-        found = _way(log, kind, heading, own)
-        if found is None or found.why_not:
+        way = _way(log, kind, heading, own)
+        if way is None or way.why_not:
             continue
-        off = float(np.angle(np.exp(1j * (found.angle - angle))))
-        if abs(off) > max(_ASTRAY * abs(angle), 2.0 * float(np.hypot(found.own_std, _LEEWAY_RAD))):
+        off = float(np.angle(np.exp(1j * (way.angle - angle))))
+        if abs(off) > max(_ASTRAY * abs(angle), 2.0 * float(np.hypot(way.own_std, _LEEWAY_RAD))):
             return False
         shown += 1
     return shown > 1 or not may_drift(log, quantile(np.abs(velocity.value), 0.5))
@@ -176,9 +176,9 @@ def _seen_from_the_bow(kind: str, heading: Series, velocity: Velocity) -> tuple[
     order = np.argsort(sector, kind="stable")
     starts = np.flatnonzero(np.concatenate([[True], np.diff(sector[order]) > 0]))
     count = np.diff(np.append(starts, sector.size))
-    seen = np.asarray(np.add.reduceat(relative[order], starts), dtype=np.complex128) / count
+    mean = np.asarray(np.add.reduceat(relative[order], starts), dtype=np.complex128) / count
     ahead = np.angle(np.add.reduceat(np.exp(1j * bow)[order], starts))
     turned: Float = np.add.reduceat(turn[order], starts) / count
     kept = count >= max(_FEWEST // 4, sector.size // 500)
     lasted = count * float(np.median(np.diff(time))) / SECOND_NS
-    return (seen[kept], ahead[kept], turned[kept], lasted[kept]) if kept.any() else None
+    return (mean[kept], ahead[kept], turned[kept], lasted[kept]) if kept.any() else None

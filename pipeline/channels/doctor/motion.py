@@ -102,16 +102,16 @@ def under_way(speed: Series | None, edges: Nanoseconds) -> NDArray[np.bool_]:
     if speed.value[0] < _UNDER_WAY * mostly:
         gathered = int(np.argmax(speed.value >= _GATHERED * mostly))
         fast &= edges >= speed.time_utc_ns[gathered]
-    found: NDArray[np.bool_] = fast[1:] & fast[:-1]
-    return found
+    mask: NDArray[np.bool_] = fast[1:] & fast[:-1]
+    return mask
 
 
 def _speeds(log: Log) -> Iterator[tuple[Nanoseconds, Float | Complex]]:
     """Yield what shows how fast she goes: log and GNSS, then velocities, those between fixes last."""
     for name in ("speed_through_water", "speed_over_ground"):
-        one = log.series.get(name)
-        if one is not None:
-            yield one.time_utc_ns, one.value
+        speed = log.series.get(name)
+        if speed is not None:
+            yield speed.time_utc_ns, speed.value
     for kind, velocity in log.velocities():
         if kind != "course":
             yield velocity.time_utc_ns, velocity.value

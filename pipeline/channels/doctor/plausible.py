@@ -73,10 +73,10 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     Clarke, Gedling and Hine (1983), "The application of manoeuvring criteria in hull design using linear theory", RINA
     Transactions 125: gains K' = K L/U of ships.
     """
-    found = [*_ranges(log)]
+    outcomes = [*_ranges(log)]
     if thorough and (log.length_m is not None or log.trial_speed_m_s is not None):
-        found += _size_and_speed(log)
-    return found
+        outcomes += _size_and_speed(log)
+    return outcomes
 
 
 def _ranges(log: Log) -> Iterator[Outcome]:
@@ -95,8 +95,8 @@ def _ranges(log: Log) -> Iterator[Outcome]:
             figures.append(Figure("size of the values", fast, 0.0, 0.0, _REACH[name], channel.unit))
             words.append(f"one in fifty values is beyond {_shown(fast, channel.unit)}")
         if any(figure.state == "disagree" for figure in figures):
-            said = "; ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
-            yield Outcome(f"range_{name}", (name,), "disagree", said, tuple(figures), 1.0,
+            text = "; ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
+            yield Outcome(f"range_{name}", (name,), "disagree", text, tuple(figures), 1.0,
                           claim=f"{name} has values that no ship has")  # fmt: skip
         elif figures:
             yield Outcome(f"range_{name}", (name,), "agree", f"{name} is within its range", tuple(figures),
@@ -119,7 +119,7 @@ def _size_and_speed(log: Log) -> list[Outcome]:
     if not speeds:
         return []
     figures: list[Figure] = []
-    seen: dict[str, float] = {}
+    ratios: dict[str, float] = {}
     typical = float(np.median(list(speeds.values())))
     trial, length = log.trial_speed_m_s, log.length_m
     if trial is not None:
@@ -127,30 +127,30 @@ def _size_and_speed(log: Log) -> list[Outcome]:
         figures += [
             Figure(f"{name} over trial speed", speed / trial, std, 0.0, _OF_TRIAL) for name, speed in speeds.items()
         ]
-        seen["speed"] = typical / trial
+        ratios["speed"] = typical / trial
     if length is not None:
-        seen["froude"] = typical / float(np.sqrt(_GRAVITY_M_S2 * length))
-        figures.append(_figure("Froude number", seen["froude"], _FROUDE))
-        figures += _turning(log, length, seen)
+        ratios["froude"] = typical / float(np.sqrt(_GRAVITY_M_S2 * length))
+        figures.append(_figure("Froude number", ratios["froude"], _FROUDE))
+        figures += _turning(log, length, ratios)
     whose = [channel for name in speeds for channel in _CHANNELS.get(name, (name,))]
-    whose += [name for name, figure in (("yaw_rate", "turn"), ("rudder_angle", "rudder")) if figure in seen]
+    whose += [name for name, figure in (("yaw_rate", "turn"), ("rudder_angle", "rudder")) if figure in ratios]
     channels = tuple(dict.fromkeys(whose))
     state: State = worst([figure.state for figure in figures])
     if state != "disagree":
         return [
             Outcome("size_and_speed", channels, "agree", "values of a ship of her size", tuple(figures), alone=True)
         ]
-    said = "; ".join(
+    text = "; ".join(
         f"{figure.name} is {figure.value:.2g}, expected {figure.low:g} to {figure.high:g}"
         for figure in figures if figure.state == "disagree"
     )  # fmt: skip
-    words = f"up to {max(speeds.values()):.3g} m/s{_of_whom(log)}: {said}"
-    likely = _likely(seen)
+    words = f"up to {max(speeds.values()):.3g} m/s{_of_whom(log)}: {text}"
+    likely = _likely(ratios)
     suspects = tuple(
         replace(fault, simplicity=2) for name in speeds for fault in unit_faults(_CHANNELS.get(name, (name,)), "m/s")
         if likely is None or list(likely) == [_SPEED]
     )  # fmt: skip
-    outcome = Outcome("size_and_speed", channels, "disagree", words, tuple(figures), _left(seen), suspects,
+    outcome = Outcome("size_and_speed", channels, "disagree", words, tuple(figures), _left(ratios), suspects,
                       claim=_claimed(likely), distrusts_length=True)  # fmt: skip
     return [outcome]
 
@@ -168,7 +168,7 @@ def _fast_speeds(log: Log) -> Iterator[tuple[str, float]]:
             yield name, quantile(np.abs(velocity.value), _MOSTLY)
 
 
-def _turning(log: Log, length: float, seen: dict[str, float]) -> Iterator[Figure]:
+def _turning(log: Log, length: float, ratios: dict[str, float]) -> Iterator[Figure]:
     """Yield the figures of the rate of turn while she is under way."""
     rate, speed, rudder = log.series.get("yaw_rate"), speed_of(log), log.series.get("rudder_angle")
     if rate is None or speed is None or may_drift(log, quantile(speed.value, _MOSTLY)):
@@ -178,13 +178,13 @@ def _turning(log: Log, length: float, seen: dict[str, float]) -> Iterator[Figure
     if np.count_nonzero(known) < _FEWEST or reach(integral(rate).value[known]) < _LEAST_TURN:
         return
     turned: Float = rate.value[known] * length / at[known]
-    seen["turn"] = quantile(np.abs(turned), 0.99)
-    yield _figure("rate of turn times length over speed", seen["turn"], _TURN)
+    ratios["turn"] = quantile(np.abs(turned), 0.99)
+    yield _figure("rate of turn times length over speed", ratios["turn"], _TURN)
     put = None if rudder is None else rudder.at(rate.time_utc_ns[known], np.inf)
     put = None if put is None else put[np.isfinite(put)]
-    if put is not None and put.size >= _FEWEST and reach(put) > _LEAST_RUDDER and seen["turn"] > 0.0:
-        seen["rudder"] = reach(turned) / reach(put)
-        yield _figure("the same over the rudder angle", seen["rudder"], _TURN_OF_RUDDER)
+    if put is not None and put.size >= _FEWEST and reach(put) > _LEAST_RUDDER and ratios["turn"] > 0.0:
+        ratios["rudder"] = reach(turned) / reach(put)
+        yield _figure("the same over the rudder angle", ratios["rudder"], _TURN_OF_RUDDER)
 
 
 def _figure(name: str, value: float, band: tuple[float, float]) -> Figure:
@@ -192,30 +192,32 @@ def _figure(name: str, value: float, band: tuple[float, float]) -> Figure:
 
 
 def _of_whom(log: Log) -> str:
-    known = []
+    particulars = []
     if log.length_m is not None:
-        known.append(f"{log.length_m:g} m long")
+        particulars.append(f"{log.length_m:g} m long")
     if log.trial_speed_m_s is not None:
-        known.append(f"with a trial speed of {log.trial_speed_m_s:g} m/s")
-    return f", in a ship {' and '.join(known)}"
+        particulars.append(f"with a trial speed of {log.trial_speed_m_s:g} m/s")
+    return f", in a ship {' and '.join(particulars)}"
 
 
-def _scaled(seen: dict[str, float]) -> dict[str, float]:
+def _scaled(ratios: dict[str, float]) -> dict[str, float]:
     """Return by how many of their standard deviations the logarithms lie beside what is usual."""
-    return {name: (float(np.log(max(value, 1e-6))) - _USUAL[name][0]) / _USUAL[name][1] for name, value in seen.items()}
+    return {
+        name: (float(np.log(max(value, 1e-6))) - _USUAL[name][0]) / _USUAL[name][1] for name, value in ratios.items()
+    }
 
 
-def _left(seen: dict[str, float]) -> float:
-    return min(sum(off**2 for off in _scaled(seen).values()) / 25.0, 1.0)
+def _left(ratios: dict[str, float]) -> float:
+    return min(sum(off**2 for off in _scaled(ratios).values()) / 25.0, 1.0)
 
 
-def _likely(seen: dict[str, float]) -> dict[str, float] | None:
+def _likely(ratios: dict[str, float]) -> dict[str, float] | None:
     """Return which of the profile's figures or of the channels may be off, and by what factor; None where none fits.
 
     One of them is taken to be wrong by a factor: what it then leaves over of the logarithms, in squares of how these
     vary from ship to ship, is compared with what the others would.
     """
-    off = _scaled(seen)
+    off = _scaled(ratios)
     total, left, factor = sum(value**2 for value in off.values()), dict[str, float](), dict[str, float]()
     for cause, powers in _POWERS.items():
         way = {name: powers.get(name, 0.0) / _USUAL[name][1] for name in off}
@@ -224,7 +226,7 @@ def _likely(seen: dict[str, float]) -> dict[str, float] | None:
             along = sum(off[name] * way[name] for name in off) / size
             left[cause], factor[cause] = total - along**2 * size, float(np.exp(along))
     best = min(left.values())
-    return {c: factor[c] for c, what in left.items() if what - best < _LIKELIER} if best <= _FITS else None
+    return {c: factor[c] for c, rest in left.items() if rest - best < _LIKELIER} if best <= _FITS else None
 
 
 def _claimed(likely: dict[str, float] | None) -> str:

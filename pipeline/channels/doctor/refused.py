@@ -18,12 +18,12 @@ def count(rejections: Iterable[pl.DataFrame]) -> dict[tuple[str, str | None], in
     rejections : iterable of polars.DataFrame
         Schema `kempf.pipeline.ingest.readings.REJECTED_SCHEMA`, in parts.
     """
-    found: dict[tuple[str, str | None], int] = {}
+    counts: dict[tuple[str, str | None], int] = {}
     for part in rejections:
         beyond = part.filter((pl.col("reason") == _OUT_OF_RANGE) & pl.col("source").is_not_null())
         for source, channel, many in beyond.group_by("source", "channel").len().iter_rows():
-            found[source, channel] = found.get((source, channel), 0) + many
-    return found
+            counts[source, channel] = counts.get((source, channel), 0) + many
+    return counts
 
 
 def by_channel(refused: Mapping[tuple[str, str | None], int], sources: Mapping[str, str]) -> dict[str, int]:
@@ -39,13 +39,13 @@ def by_channel(refused: Mapping[tuple[str, str | None], int], sources: Mapping[s
     dict of str to int
         By channel; by source where nothing of it was kept and its channels are not known.
     """
-    found: dict[str, int] = {}
-    for (source, channel), many in sorted(refused.items(), key=lambda one: (one[0][0], one[0][1] or "")):
+    counts: dict[str, int] = {}
+    for (source, channel), many in sorted(refused.items(), key=lambda item: (item[0][0], item[0][1] or "")):
         served = [name for name, whose in sources.items() if whose == source]
         if channel is not None:
             names = [channel] if sources.get(channel, source) == source else []
         else:
             names = served or [source]
         for name in names:
-            found[name] = found.get(name, 0) + many
-    return found
+            counts[name] = counts.get(name, 0) + many
+    return counts

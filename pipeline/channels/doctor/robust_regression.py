@@ -117,11 +117,11 @@ def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Floa
     value: Float = np.zeros(columns.shape[1])
     more = 1.0
     weight = np.ones(observed.size)
-    A, y, known = columns / noise_std[:, None], observed / noise_std, np.diag(prior_std**-2.0)
+    A, y, prior = columns / noise_std[:, None], observed / noise_std, np.diag(prior_std**-2.0)
     for _ in range(_ROUNDS):
         last = value
         weighted = (A * (weight / more**2)[:, None]).T
-        precision = weighted @ A + known
+        precision = weighted @ A + prior
         value = np.asarray(np.linalg.lstsq(precision, weighted @ y, rcond=1e-15)[0], dtype=np.float64)
         if np.max(np.abs(value - last)) < _SETTLED * np.max(np.abs(value)):
             break

@@ -34,7 +34,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     if not log.has(_CHANNELS):
         return []
     name = "rudder_order_angle"
-    order, angle = (log.series[one] for one in _CHANNELS)
+    order, angle = (log.series[channel] for channel in _CHANNELS)
     if max(reach(order.value), reach(angle.value)) < _LEAST:
         return [untestable(name, _CHANNELS, "the rudder was hardly used")]
     best: tuple[float, float] | None = None
@@ -49,18 +49,18 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     if best is None or best[0] > 0.75:
         return [untestable(name, _CHANNELS, "rudder order and rudder angle are not correlated")]
     put = order.at(angle.time_utc_ns - round(best[1] * SECOND_NS), gap_limit_s(order))
-    found = fit(np.column_stack([put, np.ones_like(put)]), angle.value)
-    if found is None:
+    line = fit(np.column_stack([put, np.ones_like(put)]), angle.value)
+    if line is None:
         return [untestable(name, _CHANNELS, "the channels hardly overlap in time")]
-    slope, offset = float(found.value[0]), float(found.value[1])
+    slope, offset = float(line.value[0]), float(line.value[1])
     # the rudder on its way between two orders is neither lag nor fault
-    slope_std = float(np.hypot(found.std[0], 0.05 * abs(slope)))
+    slope_std = float(np.hypot(line.std[0], 0.05 * abs(slope)))
     figures = (
         Figure("rudder angle over rudder order", slope, slope_std, *_SLOPES),
         Figure(
             "rudder angle at zero order",
             np.rad2deg(offset),
-            np.rad2deg(found.std[1]) + 0.5,
+            np.rad2deg(line.std[1]) + 0.5,
             *_OFFSETS_DEG,
             "deg",
         ),
@@ -71,13 +71,13 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         f"lags by {best[1]:.1f} s"
     )
     suspects = [
-        *(Fault("sign", (one,)) for one in _CHANNELS),
-        *(Fault("unit", (one,), 180.0 / np.pi, "rad taken for deg") for one in _CHANNELS),
+        *(Fault("sign", (channel,)) for channel in _CHANNELS),
+        *(Fault("unit", (channel,), 180.0 / np.pi, "rad taken for deg") for channel in _CHANNELS),
     ]
     if abs(slope) > 4.0 * slope_std:
         suspects += [
-            Fault("offset", ("rudder_order",), offset / slope, "zero elsewhere", float(found.std[1]) / abs(slope)),
-            Fault("offset", ("rudder_angle",), -offset, "zero elsewhere", float(found.std[1])),
+            Fault("offset", ("rudder_order",), offset / slope, "zero elsewhere", float(line.std[1]) / abs(slope)),
+            Fault("offset", ("rudder_angle",), -offset, "zero elsewhere", float(line.std[1])),
         ]
     # half the gear's usual time is left where a clock is set right
     suspects += [

@@ -64,7 +64,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     Nomoto, Taguchi, Honda and Hirano (1957), "On the steering qualities of ships", International Shipbuilding
     Progress 4: T dr/dt + r = K delta, here r(t1) - r(t0) = -(turn)/T + (K/T) int delta + constant.
     """
-    found = []
+    outcomes = []
     for rudder in ("rudder_angle", "rudder_order"):
         if rudder not in log.series:
             continue
@@ -72,8 +72,8 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         each = [
             _compare(f"{rudder}_{name}", (rudder, *how), log, turned, thorough=thorough) for name, how, turned in turns
         ]
-        found += _of_one_mind(log, each, thorough=thorough)
-    return found
+        outcomes += _of_one_mind(log, each, thorough=thorough)
+    return outcomes
 
 
 def _of_one_mind(log: Log, each: list[list[Outcome]], *, thorough: bool) -> list[Outcome]:
@@ -103,13 +103,13 @@ def _other(check: str) -> str:
 
 def _turns(log: Log, *, all_of_them: bool) -> list[tuple[str, tuple[str, ...], tuple[Series, Series]]]:
     """Return what shows the turn: name, channels, the angle turned and the rate of turn."""
-    found: list[tuple[str, tuple[str, ...], tuple[Series, Series]]] = []
+    turns: list[tuple[str, tuple[str, ...], tuple[Series, Series]]] = []
     heading, rate = log.series.get("heading"), log.series.get("yaw_rate")
     if heading is not None and (all_of_them or rate is None) and len(turning(heading)) > 1:
-        found.append(("heading", ("heading",), (heading, turning(heading))))
+        turns.append(("heading", ("heading",), (heading, turning(heading))))
     if rate is not None:
-        found.append(("rate", ("yaw_rate",), (integral(rate), rate)))
-    return found
+        turns.append(("rate", ("yaw_rate",), (integral(rate), rate)))
+    return turns
 
 
 def _compare(
@@ -254,17 +254,17 @@ def _best(windows: _Windows, rudder: Series, shifts: Float) -> _Answer | None:
     k = _chosen(whole[1:], shifts)
     if not np.isfinite(whole[1 + k]):
         return None
-    found = _fitted(windows, put[k], np.isfinite(windows.jump))
+    line = _fitted(windows, put[k], np.isfinite(windows.jump))
     near = _chosen(whole[1:], shifts, far_better=0.0)
-    usual = found if near == k else _fitted(windows, put[near], np.isfinite(windows.jump))
-    if found is None or usual is None:
+    usual = line if near == k else _fitted(windows, put[near], np.isfinite(windows.jump))
+    if line is None or usual is None:
         return None
     known = np.isfinite(windows.jump)
     rate = windows.turn[known] / windows.long[known]
     together = float(np.corrcoef(windows.rudder[known], rate)[0, 1]) if np.ptp(windows.rudder[known]) > 0.0 else 0.0
     explains = 1.0 - float(whole[1 + k] / whole[0])
-    ambiguous = bool(found.value[0] * usual.value[0] < 0.0)
-    return _Answer(found, float(shifts[k]), explains, windows, put, shifts, together, ambiguous)
+    ambiguous = bool(line.value[0] * usual.value[0] < 0.0)
+    return _Answer(line, float(shifts[k]), explains, windows, put, shifts, together, ambiguous)
 
 
 def _chosen(left: Float, shifts: Float, far_better: float = _FAR_BETTER) -> int:
@@ -287,8 +287,8 @@ def _parts(windows: _Windows) -> list[NDArray[np.bool_]]:
     """Return stretches of the log, one after the other, in each of which the rudder worked as much, each shape (n,)."""
     known = np.isfinite(windows.rudder)
     work = np.where(known, (windows.rudder - np.mean(windows.rudder[known])) ** 2, 0.0)
-    done = np.cumsum(work) / max(float(np.sum(work)), 1e-300)
-    stretch = np.minimum(np.floor(done * _STRETCHES), _STRETCHES - 1)
+    share = np.cumsum(work) / max(float(np.sum(work)), 1e-300)
+    stretch = np.minimum(np.floor(share * _STRETCHES), _STRETCHES - 1)
     return [known & (stretch == k) for k in range(_STRETCHES)]
 
 
@@ -313,8 +313,8 @@ def _mean_squares(put: Float, turn: Float, long: Float, observed: Float) -> Floa
 
 def _clock(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
     """Judge the shift of the rudder at which she answers best."""
-    found, shift = answered.fit, answered.shift_s
-    if answered.explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
+    line, shift = answered.fit, answered.shift_s
+    if answered.explains < _CLOCKED or abs(line.value[0]) < SURE * line.std[0]:
         return untestable(name, channels, "the yaw response is too weak to determine the rudder's delay")
     figure = Figure("delay of the rudder channel behind the yaw response", shift, _SHIFT_STD_S, *USUAL_S, "s")
     when = "earlier" if shift > 0 else "later"
@@ -333,17 +333,17 @@ def _clock(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
 def _same_shift(answered: _Answer) -> bool:
     """Return whether she answers best at this shift in each stretch of the log."""
     left = [_left(answered.put, answered.windows, part) for part in _parts(answered.windows)]
-    return all(abs(answered.shifts[_chosen(one, answered.shifts)] - answered.shift_s) <= _SAME_S for one in left)
+    return all(abs(answered.shifts[_chosen(rest, answered.shifts)] - answered.shift_s) <= _SAME_S for rest in left)
 
 
 def _judged(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
-    found = answered.fit
-    answer, std = float(found.value[0]), float(found.std[0])
+    line = answered.fit
+    answer, std = float(line.value[0]), float(line.std[0])
     if answered.explains < _EXPLAINS or abs(answer) < SURE * std:
         why = "the yaw response to the rudder cannot be distinguished from other yaw motion"
         return untestable(name, channels, why)
-    neutral = -float(found.value[2]) / answer
-    neutral_std = float(np.hypot(found.std[2] / abs(answer), np.deg2rad(_NEUTRAL_STD_DEG)))
+    neutral = -float(line.value[2]) / answer
+    neutral_std = float(np.hypot(line.std[2] / abs(answer), np.deg2rad(_NEUTRAL_STD_DEG)))
     figures = (
         Figure("yaw acceleration per rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
         Figure(
@@ -362,7 +362,7 @@ def _judged(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
     state = "disagree" if answer < 0.0 else worst([figures[1].state, "agree"])
     if state == "disagree" and not _repeated(answered, neutral):
         return untestable(name, channels, f"{words}, but not in every stretch of the log")
-    sign = [Fault("sign", (one,)) for one in channels]
+    sign = [Fault("sign", (channel,)) for channel in channels]
     if channels[1] == "heading":
         sign.append(Fault("offset", ("heading",), np.pi / 2, "counted anticlockwise from east", simplicity=2))
     suspects = (*sign, Fault("offset", channels[:1], -neutral, "zero elsewhere", neutral_std))
@@ -381,15 +381,15 @@ def _repeated(answered: _Answer, neutral: float) -> bool:
     sure = 0
     put = answered.put[int(np.argmin(np.abs(answered.shifts - answered.shift_s)))]
     for part in _parts(answered.windows):
-        one = _fitted(answered.windows, put, part)
-        if one is None:
+        line = _fitted(answered.windows, put, part)
+        if line is None:
             continue
-        answer, std = float(one.value[0]), float(one.std[0])
+        answer, std = float(line.value[0]), float(line.std[0])
         if sense * answer < -std:
             return False
         if sense * answer < 2.0 * std:
             continue
-        own = -float(one.value[2]) / answer
+        own = -float(line.value[2]) / answer
         if sense > 0.0 and not (abs(own) > np.deg2rad(_NEUTRAL_DEG) and own * neutral > 0.0):
             return False
         sure += 1

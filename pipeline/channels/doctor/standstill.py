@@ -40,13 +40,13 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     if does_not_move(log):
         others = [("yaw_rate", "heading")] if rate is not None else []
         pairs = [("heading", "yaw_rate" if rate is not None else "course_over_ground"), *others]
-        return [untestable(f"{one}_standstill", (one, other), STILL) for one, other in pairs]
+        return [untestable(f"{channel}_standstill", (channel, reference), STILL) for channel, reference in pairs]
     way = None if velocity is None else Series(velocity.time_utc_ns, velocity.under_way.astype(np.float64))
     if rate is None:
         assert velocity is not None
         course = Series(velocity.time_utc_ns, velocity.direction)
-        found = _heading_turns(heading, course, way, _COURSE * _TURN_RAD)
-        return [_judged("heading", "course_over_ground", found, reach(course.value))]
+        standstill = _heading_turns(heading, course, way, _COURSE * _TURN_RAD)
+        return [_judged("heading", "course_over_ground", standstill, reach(course.value))]
     turn = integral(rate)
     return [
         _judged("heading", "yaw_rate", _heading_turns(heading, turn, way, _TURN_RAD, _BIAS_RAD_S), reach(turn.value)),
@@ -54,18 +54,18 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     ]
 
 
-def _judged(channel: str, other: str, found: tuple[Series, float] | None, in_all: float) -> Outcome:
-    name, channels = f"{channel}_standstill", (channel, other)
-    if found is None and in_all < 2.0 * _TURN_RAD:
+def _judged(channel: str, reference: str, standstill: tuple[Series, float] | None, in_all: float) -> Outcome:
+    name, channels = f"{channel}_standstill", (channel, reference)
+    if standstill is None and in_all < 2.0 * _TURN_RAD:
         return untestable(name, channels, "the ship hardly turned")
-    turned = 0.0 if found is None else found[1]
+    turned = 0.0 if standstill is None else standstill[1]
     figure = Figure("turn while the channel is constant", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
-    if found is None:
+    if standstill is None:
         return Outcome(name, channels, "agree", f"{channel} is never constant while the ship turns", (figure,))
-    start, end = int(found[0].time_utc_ns[0]), int(found[0].time_utc_ns[-1])
+    start, end = int(standstill[0].time_utc_ns[0]), int(standstill[0].time_utc_ns[-1])
     words = (
         f"{channel} is constant for {(end - start) / SECOND_NS:.0f} s, during which the ship turns by "
-        f"{figure.value:.0f} deg according to {other}"
+        f"{figure.value:.0f} deg according to {reference}"
     )
     fault = Fault("stuck", (channel,), (end - start) / SECOND_NS, start_utc_ns=start)
     return Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))
@@ -79,8 +79,8 @@ def _repeats(series: Series, way: Series | None) -> Iterator[Series]:
     enough = np.flatnonzero((long >= _LEAST_S * SECOND_NS) & (last - first >= _LEAST_READINGS))
     for k in enough[np.argsort(-long[enough], kind="stable")][:_MOST]:
         start, end = int(series.time_utc_ns[first[k]]), int(series.time_utc_ns[last[k]])
-        made = None if way is None else way.between(start, end).value
-        if made is None or not made.size or float(np.mean(made)) > 0.5:
+        under_way = None if way is None else way.between(start, end).value
+        if under_way is None or not under_way.size or float(np.mean(under_way)) > 0.5:
             yield series.between(start, end)
 
 

@@ -35,7 +35,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     track = log.track()
     if track is None:
         return []
-    found = []
+    outcomes = []
     for kind in ("course", "earth", "body"):
         velocity = log.over_ground(kind)
         if velocity is None or velocity.time_utc_ns.size < _FEWEST:
@@ -47,17 +47,17 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         speed = pair[:1] if kind == "course" else pair
         if ways is None:
             why = STILL if still else "the distance between the position fixes is too short"
-            found += [untestable(f"{what}_{kind}", channels, why) for what in ("path", "bearing")]
+            outcomes += [untestable(f"{check}_{kind}", channels, why) for check in ("path", "bearing")]
             continue
         length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
         # in a turn to one side only, a fix that is late looks turned
         step = np.diff(velocity.time_utc_ns) / SECOND_NS
         late = 1.0 + quantile(step, 0.5)
         one_sided = late * abs(quantile(np.diff(velocity.direction) / step, 0.5))
-        found += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
-    if not found and "speed_over_ground" in log.series:
-        found += _without_course(log, track)
-    return found
+        outcomes += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
+    if not outcomes and "speed_over_ground" in log.series:
+        outcomes += _without_course(log, track)
+    return outcomes
 
 
 def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Complex) -> tuple[Complex, Complex] | None:
@@ -109,8 +109,8 @@ def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...]
     # the windows overlap: a quarter of them is independent
     std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
     figure = Figure("integrated speed over distance between fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
-    what = "velocity" if len(speed) > 1 else speed[0].replace("_", " ")
-    words = f"integrated {what} is {ratio:.3g} ± {std:.1g} (1 s.e.) times the distance between fixes"
+    quantity = "velocity" if len(speed) > 1 else speed[0].replace("_", " ")
+    words = f"integrated {quantity} is {ratio:.3g} ± {std:.1g} (1 s.e.) times the distance between fixes"
     suspects = [
         *unit_faults(speed, "m/s"),
         *unit_faults(("latitude", "longitude"), "rad"),

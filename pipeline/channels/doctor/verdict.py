@@ -35,8 +35,8 @@ def as_content(
     """
     return {
         "verdict": examination.verdict,
-        "findings": [_finding(one, known, log_format) for one in examination.findings],
-        "checks": [_outcome(one) for one in examination.outcomes],
+        "findings": [_finding(finding, known, log_format) for finding in examination.findings],
+        "checks": [_outcome(outcome) for outcome in examination.outcomes],
         "untested": list(examination.untested),
         "moves": not examination.still,
         "cannot_see": list(examination.cannot_see),
@@ -54,8 +54,10 @@ def _finding(finding: ChannelFinding, known: Mapping[str, tuple[str, ChannelMap]
                 "words": words(fault),
                 "value": fault.value,
                 "std": fault.std,
-                "profile": [one.line for one in corrections],
-                "entries": {one.key: one.mapped.model_dump(exclude_defaults=True) for one in corrections},
+                "profile": [correction.line for correction in corrections],
+                "entries": {
+                    correction.key: correction.mapped.model_dump(exclude_defaults=True) for correction in corrections
+                },
             }
         )
     return {
@@ -63,7 +65,7 @@ def _finding(finding: ChannelFinding, known: Mapping[str, tuple[str, ChannelMap]
         "channels": list(finding.channels),
         "certain": len(finding.faults) == 1,
         "faults": faults,
-        "evidence": [_outcome(one) for one in finding.evidence],
+        "evidence": [_outcome(outcome) for outcome in finding.evidence],
     }
 
 

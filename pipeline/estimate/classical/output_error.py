@@ -46,11 +46,11 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Output
     """
     still = spec.model_copy(update={"wind": "none", "moment": "none", "current": "none"})
     used = _without_means(record) if settings.remove_means else record
-    found = maximum_likelihood.identify(used, still, arm_per_m, settings)
+    estimate = maximum_likelihood.identify(used, still, arm_per_m, settings)
     if not disturbed(spec):
-        return replace(found, estimator="output-error")
+        return replace(estimate, estimator="output-error")
     unknown = "output-error does not model wind and current; they bias the parameters"
-    return replace(found, estimator="output-error", warnings=(unknown, *found.warnings))
+    return replace(estimate, estimator="output-error", warnings=(unknown, *estimate.warnings))
 
 
 def _without_means(record: Record) -> Record:

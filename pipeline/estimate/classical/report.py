@@ -52,14 +52,14 @@ def estimate_of(
     values = np.full(6, np.nan) if hull is None else hull
     whole = bool(np.all(np.isfinite(values)))
     step, speed = step_of(record), record.mean_speed_m_s
-    said = [*record.warnings]
+    caveats = [*record.warnings]
     if disturbed(spec):
-        said.append(f"{name} does not model {blind_to}; they bias the parameters")
+        caveats.append(f"{name} does not model {blind_to}; they bias the parameters")
     if not converged:
-        said.append(f"not converged: {reason}")
-    said += warnings
+        caveats.append(f"not converged: {reason}")
+    caveats += warnings
     if whole:
-        said += plausibility_warnings(values, np.sqrt(np.diag(covariance)), fit or {})
+        caveats += plausibility_warnings(values, np.sqrt(np.diag(covariance)), fit or {})
     discrete = discrete_values(values, covariance, speed, step) if whole else ()
     return Estimate(
         estimator=name,
@@ -78,7 +78,7 @@ def estimate_of(
         },
         iterations=iterations,
         fit=fit or {},
-        warnings=tuple(said),
+        warnings=tuple(caveats),
     )
 
 

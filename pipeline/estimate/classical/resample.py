@@ -40,8 +40,8 @@ def even(record: Record, step_s: float | None) -> Record:
         if good.any():
             series[name] = Series(time_ns[good], record.measured[good, i])
     step = max(series["lateral_speed"].period_s, 0.1) if step_s is None else step_s
-    start = max(int(one.time_utc_ns[0]) for one in series.values())
-    end = min(int(one.time_utc_ns[-1]) for one in series.values())
+    start = max(int(channel.time_utc_ns[0]) for channel in series.values())
+    end = min(int(channel.time_utc_ns[-1]) for channel in series.values())
     grid = make_grid(series, start, end, step)
     measured = np.full((grid.time_utc_ns.size, len(MEASUREMENTS)), np.nan)
     for i, name in enumerate(MEASUREMENTS):

@@ -87,9 +87,9 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Subspa
             {"instants": int(outputs.shape[0]), "needed": 8 * settings.horizon},
         )
     spread = np.std(outputs, axis=0)
-    found = realise(outputs / spread, held[:, None], settings.horizon)
-    A, B = found.A * np.outer(spread, 1.0 / spread), found.B * spread[:, None]
-    hull, reason = None, found.reason
+    realisation = realise(outputs / spread, held[:, None], settings.horizon)
+    A, B = realisation.A * np.outer(spread, 1.0 / spread), realisation.B * spread[:, None]
+    hull, reason = None, realisation.reason
     if not reason:
         ship = continuous_from_discrete(A, B, used.mean_speed_m_s, step_of(used))
         hull = None if ship is None else ship.array()
@@ -102,17 +102,17 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Subspa
         NO_UNCERTAINTY,
         converged=hull is not None,
         reason=reason or "a projection has a closed form",
-        report=_report(found, A, B, settings, outputs.shape[0]),
+        report=_report(realisation, A, B, settings, outputs.shape[0]),
         spec=spec,
         warnings=("no standard errors: the subspace method gives none",),
     )
 
 
-def _report(found: Realisation, A: Float, B: Float, settings: SubspaceSettings, instants: int) -> dict[str, Any]:
+def _report(realisation: Realisation, A: Float, B: Float, settings: SubspaceSettings, instants: int) -> dict[str, Any]:
     return {
         "horizon": settings.horizon,
         "instants": instants,
-        "singular_values": [float(s) for s in found.singular[:6]],
+        "singular_values": [float(s) for s in realisation.singular[:6]],
         "A": [[float(a) for a in row] for row in A] if np.all(np.isfinite(A)) else None,
         "B": [float(b) for b in B[:, 0]] if np.all(np.isfinite(B)) else None,
     }

@@ -107,24 +107,24 @@ def identify_without_log(
     UsageError
         ``trial_speed``: it or its standard deviation is not positive, or the latter stands alone.
     """
-    known, said = _known(no_log or NoLogSettings(), record)
+    known, notes = _known(no_log or NoLogSettings(), record)
 
-    def fit(one: Record) -> Estimate:
-        return maximum_likelihood.identify(one, spec, arm_per_m, settings)
+    def fit(run: Record) -> Estimate:
+        return maximum_likelihood.identify(run, spec, arm_per_m, settings)
 
     order, estimates, left_out = _first_fits(record, companions, spec, fit)
     own = next(i for i, r in enumerate(order) if r is record)
-    given = [with_rudder_inflow(r, spec) for r in order]
+    records = [with_rudder_inflow(r, spec) for r in order]
     parameters: Float | None = None
     rounds: list[dict[str, Any]] = []
     converged = False
     for number in range(known.max_rounds):
         if number:
-            estimates = tuple(fit(r) for r in given)
+            estimates = tuple(fit(r) for r in records)
         fits = tuple(_lateral_fit(e, spec, arm_per_m) for e in estimates)
-        moving = tuple(run_of(coarsened(r)) for r in given)
-        found = speed_without_log(Motion(moving, fits, _priors(order, spec, known), spec.current), parameters)
-        speed, motion, parameters = found
+        moving = tuple(run_of(coarsened(r)) for r in records)
+        solution = speed_without_log(Motion(moving, fits, _priors(order, spec, known), spec.current), parameters)
+        speed, motion, parameters = solution
         mean, std = motion.mean_speed(parameters, own)
         change = [v - run.record.speed_m_s for v, run in zip(speed.speed_m_s, moving, strict=True)]
         # the mean may stay while the shape changes: a current across the course makes the GNSS speed swing
@@ -134,13 +134,13 @@ def identify_without_log(
         if far < known.tolerance * mean:
             converged = True
             break
-        given = [
+        records = [
             with_rudder_inflow(replace(r, speed_m_s=np.interp(r.time_s, run.record.time_s, v)), spec)
             for r, run, v in zip(order, moving, speed.speed_m_s, strict=True)
         ]
-    result = _combined(estimates, found, own, rounds, converged=converged, no_log=known)
+    result = _combined(estimates, solution, own, rounds, converged=converged, no_log=known)
     # in still water the speed over ground along the bow is the speed, whatever the trial speed
-    ours = () if spec.current == "none" else said
+    ours = () if spec.current == "none" else notes
     return replace(result, warnings=(*result.warnings, *ours, *left_out))
 
 
@@ -170,8 +170,8 @@ def _first_fits(
         else:
             reasons.append("not_converged")
     kept.sort(key=lambda pair: pair[0].start_utc_ns)
-    said = (f"{len(reasons)} of {len(companions)} other manoeuvres left out: {', '.join(reasons)}",) if reasons else ()
-    return [r for r, _ in kept], tuple(e for _, e in kept), said
+    note = (f"{len(reasons)} of {len(companions)} other manoeuvres left out: {', '.join(reasons)}",) if reasons else ()
+    return [r for r, _ in kept], tuple(e for _, e in kept), note
 
 
 def _known(no_log: NoLogSettings, record: Record) -> tuple[NoLogSettings, tuple[str, ...]]:
@@ -190,13 +190,13 @@ def _known(no_log: NoLogSettings, record: Record) -> tuple[NoLogSettings, tuple[
         return no_log, ()
     over_ground = record.mean_speed_m_s
     if abs(over_ground / speed - 1.0) > _SAME_ENGINE:
-        said = (
+        note = (
             f"the trial speed of {speed:.2f} m/s is not used: she made {over_ground:.2f} m/s over ground, perhaps at "
             "another engine setting; state its standard deviation if it holds for this run"
         )
-        return replace(no_log, trial_speed_m_s=None), (said,)
-    said = f"the trial speed of {speed:.2f} m/s is taken to be known to {100 * _TRIAL_SPEED_STD:.0f} %"
-    return replace(no_log, trial_speed_std_m_s=_TRIAL_SPEED_STD * speed), (said,)
+        return replace(no_log, trial_speed_m_s=None), (note,)
+    note = f"the trial speed of {speed:.2f} m/s is taken to be known to {100 * _TRIAL_SPEED_STD:.0f} %"
+    return replace(no_log, trial_speed_std_m_s=_TRIAL_SPEED_STD * speed), (note,)
 
 
 def _lateral_fit(estimate: Estimate, spec: ModelSpec, arm_per_m: float) -> LateralFit:
@@ -260,7 +260,7 @@ def _hull_gradient(motion: Motion, parameters: Float, own: int, number: int, std
 
 def _combined(
     estimates: tuple[Estimate, ...],
-    found: tuple[Speed, Motion, Float],
+    solution: tuple[Speed, Motion, Float],
     own: int,
     rounds: list[dict[str, Any]],
     *,
@@ -268,7 +268,7 @@ def _combined(
     no_log: NoLogSettings,
 ) -> Estimate:
     """Scale the last fit to the last speed and let the uncertainty of the speed join its covariance."""
-    speed, motion, parameters = found
+    speed, motion, parameters = solution
     fit = estimates[own]
     mean, given_std = motion.mean_speed(parameters, own)
     variance = given_std**2 + motion.surge_variance(parameters, own)
@@ -277,9 +277,9 @@ def _combined(
         variance += (0.5 * speed.misfit_m_s[own][0]) ** 2
     gradient = np.zeros(6)
     for number, estimate in enumerate(estimates):
-        one = _hull_gradient(motion, parameters, own, number, np.sqrt(np.diag(estimate.covariance)))
-        variance += float(one @ estimate.covariance @ one)
-        gradient = one if number == own else gradient
+        slope = _hull_gradient(motion, parameters, own, number, np.sqrt(np.diag(estimate.covariance)))
+        variance += float(slope @ estimate.covariance @ slope)
+        gradient = slope if number == own else gradient
     used = mean - rounds[-1]["moved_m_s"]
     factor = (used / mean) ** SPEED_POWER
     hull, C = fit.hull.array() * factor, fit.covariance * np.outer(factor, factor)
@@ -333,19 +333,19 @@ def _speed_report(
 
 
 def _warnings(speed: Speed, own: int, mean: float, std: float, current: str, *, converged: bool) -> list[str]:
-    said = [f"no water log: speed {mean:.2f} m/s, standard error {std:.2g} m/s, estimated from GNSS and the turns"]
+    warnings = [f"no water log: speed {mean:.2f} m/s, standard error {std:.2g} m/s, estimated from GNSS and the turns"]
     if current == "none":
-        said.append("the model has no current: the GNSS speed along the bow is the speed through the water")
+        warnings.append("the model has no current: the GNSS speed along the bow is the speed through the water")
     if std > _POORLY_KNOWN * mean:
-        said.append(
+        warnings.append(
             f"the speed through the water is known to {100 * std / mean:.0f} % only, and every parameter with it: "
             "sail a manoeuvre on the opposite heading, or state the trial speed and how well it is known"
         )
     if _contradicts(speed, own):
-        said.append(
+        warnings.append(
             f"the lateral motion implies {speed.misfit_m_s[own][0]:.2f} m/s more current along the course than the "
             "GNSS speed along the bow: unmodelled hull force; the speed is less certain"
         )
     if not converged:
-        said.append("not converged: the speed through the water still moved when the rounds allowed ran out")
-    return said
+        warnings.append("not converged: the speed through the water still moved when the rounds allowed ran out")
+    return warnings

@@ -79,8 +79,8 @@ def identify(record: Record, settings: LeastSquaresSettings) -> Estimate:
     """
     sampled = sample(record, settings.step_s)
     now, after = whole_pairs(sampled)
-    found = regress(sampled.measured[now], sampled.rudder[now, None], sampled.measured[after])
-    return estimate_from_discrete("least-squares", sampled, found, record.warnings, converged=True)
+    regression = regress(sampled.measured[now], sampled.rudder[now, None], sampled.measured[after])
+    return estimate_from_discrete("least-squares", sampled, regression, record.warnings, converged=True)
 
 
 def whole_pairs(sampled: Sampled) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -93,7 +93,7 @@ def whole_pairs(sampled: Sampled) -> tuple[NDArray[np.int64], NDArray[np.int64]]
 def estimate_from_discrete(
     name: str,
     sampled: Sampled,
-    found: Regression,
+    regression: Regression,
     warnings: tuple[str, ...],
     *,
     converged: bool,
@@ -102,20 +102,20 @@ def estimate_from_discrete(
 ) -> Estimate:
     """Turn matrices of eq. (17) into an `Estimate` with the parameters of eq. (16) at the mean speed."""
     caveats = list(warnings)
-    hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
-    if found.rank < 3:
-        caveats.append(f"the regressor matrix is singular (rank {found.rank} of 3): minimum-norm solution")
+    hull = continuous_from_discrete(regression.A, regression.B, sampled.speed_m_s, sampled.step_s)
+    if regression.rank < 3:
+        caveats.append(f"the regressor matrix is singular (rank {regression.rank} of 3): minimum-norm solution")
     if hull is None:
         caveats.append("the discrete matrices belong to no continuous ship: an eigenvalue is not positive")
     caveats.append("standard errors leave out the bias that noise in the regressors causes")
     values = hull.array() if hull is not None else np.full(6, np.nan)
-    covariance = _continuous_covariance(found, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
+    covariance = _continuous_covariance(regression, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
     if hull is not None:
         caveats += plausibility_warnings(values, np.sqrt(np.diag(covariance)), {})
     names = ("A11", "A12", "A21", "A22", "B1", "B2")
     units = ("1", "m/rad", "rad/m", "1", "m/s/rad", "1/s")
-    flat = np.concatenate([found.A.ravel(), found.B.ravel()])
-    std = np.concatenate([found.std[:, :2].ravel(), found.std[:, 2]])
+    flat = np.concatenate([regression.A.ravel(), regression.B.ravel()])
+    std = np.concatenate([regression.std[:, :2].ravel(), regression.std[:, 2]])
     return Estimate(
         estimator=name,
         parameters=hull_values(values, covariance),
@@ -126,7 +126,7 @@ def estimate_from_discrete(
         report={
             "converged": converged and hull is not None,
             "reason": reason,
-            "rank": found.rank,
+            "rank": regression.rank,
             "step_s": sampled.step_s,
             "speed_m_s": sampled.speed_m_s,
             "iterations": max(0, len(iterations) - 1),
@@ -137,11 +137,11 @@ def estimate_from_discrete(
     )
 
 
-def _continuous_covariance(found: Regression, hull: Hull, sampled: Sampled) -> Float:
+def _continuous_covariance(regression: Regression, hull: Hull, sampled: Sampled) -> Float:
     """Carry the discrete standard errors to continuous time, first order, central differences, shape (6, 6)."""
-    flat = np.concatenate([found.A.ravel(), found.B.ravel()])
+    flat = np.concatenate([regression.A.ravel(), regression.B.ravel()])
     order = [0, 1, 3, 4, 2, 5]  # from the rows of [A B] to A11, A12, A21, A22, B1, B2
-    of_flat = found.covariance[np.ix_(order, order)]
+    of_flat = regression.covariance[np.ix_(order, order)]
     jacobian = np.empty((6, 6))
     for i in range(6):
         step = 1e-6 * max(abs(flat[i]), 1e-6)
@@ -149,10 +149,10 @@ def _continuous_covariance(found: Regression, hull: Hull, sampled: Sampled) -> F
         for sign in (1.0, -1.0):
             moved = flat.copy()
             moved[i] += sign * step
-            other = continuous_from_discrete(
+            neighbour = continuous_from_discrete(
                 moved[:4].reshape(2, 2), moved[4:].reshape(2, 1), sampled.speed_m_s, sampled.step_s
             )
-            sides.append((other or hull).array())
+            sides.append((neighbour or hull).array())
         jacobian[:, i] = (sides[0] - sides[1]) / (2.0 * step)
     covariance: Float = jacobian @ of_flat @ jacobian.T
     return covariance

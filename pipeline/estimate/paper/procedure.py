@@ -99,19 +99,19 @@ def iterate(
         ``segment_too_short``: fewer whole steps than unknowns in a row of [A B].
     """
     now = _whole_steps(vehicle, measured, settings.skip)
-    found = regress(measured[now], inputs[now], measured[now + 1])
+    regression = regress(measured[now], inputs[now], measured[now + 1])
     scale = _scale(measured, inputs, now)
-    passes = [ProcedurePass(found, np.nan, np.full_like(R, np.nan), None)]
+    passes = [ProcedurePass(regression, np.nan, np.full_like(R, np.nan), None)]
     states, targets = measured[now], measured[now + 1]
     end: tuple[End, str, int | None] | None = None
     converged = ""
     for count in range(1, settings.iterations + 1):
-        bounded = _bounded(R, found, states, inputs[now], targets) if settings.floor else R
-        filtered = _filtered(vehicle, found, measured, inputs, bounded)
+        bounded = _bounded(R, regression, states, inputs[now], targets) if settings.floor else R
+        filtered = _filtered(vehicle, regression, measured, inputs, bounded)
         if filtered is None:
             end = ("diverged", f"diverged in iteration {count}: the filter of the last parameters does not exist", None)
             break
-        W, entering = filtered.updated[:, len(vehicle.states) :], vehicle.entering(found.A)
+        W, entering = filtered.updated[:, len(vehicle.states) :], vehicle.entering(regression.A)
         size = _size(vehicle, W, entering, measured)
         if not size < _ABSURD:
             words = f"disturbances {size:.0f} times what was measured"
@@ -119,17 +119,17 @@ def iterate(
             break
         corrected = measured - W @ vehicle.carried.T  # (15)
         states, targets = corrected[now], corrected[now + 1] - W[now] @ entering.T
-        previous, found = found, regress(states, inputs[now], targets)
-        change = _distance(found, previous, scale)
-        passes.append(ProcedurePass(found, change, bounded, filtered))
+        previous, regression = regression, regress(states, inputs[now], targets)
+        change = _distance(regression, previous, scale)
+        passes.append(ProcedurePass(regression, change, bounded, filtered))
         if change < settings.tolerance and not converged:
             converged = f"converged in iteration {count}: it changed [A B] by {change:.1e}"
             if not settings.run_on:
                 break
     if end is None:
         end = ("converged", converged, None) if converged else judge(passes, scale)
-    bounded = _bounded(R, found, states, inputs[now], targets) if settings.floor else R
-    last = _filtered(vehicle, found, measured, inputs, bounded)
+    bounded = _bounded(R, regression, states, inputs[now], targets) if settings.floor else R
+    last = _filtered(vehicle, regression, measured, inputs, bounded)
     return ProcedureCourse(tuple(passes), end[0], end[1], end[2], vehicle.hidden(passes[0].regression.A), last)
 
 
@@ -147,11 +147,11 @@ def judge(passes: list[ProcedurePass], scale: Float) -> tuple[End, str, int | No
     reason : str
     period : int or None
     """
-    found = [p.regression for p in passes]
-    strides = [_distance(one, other, scale) for one, other in zip(found[1:], found, strict=False)]
-    for period in range(2, (len(found) - 1) // 2 + 1):
-        ring = range(len(found) - period, len(found))
-        back = max(_distance(found[k], found[k - period], scale) for k in ring)
+    fits = [p.regression for p in passes]
+    strides = [_distance(later, earlier, scale) for later, earlier in zip(fits[1:], fits, strict=False)]
+    for period in range(2, (len(fits) - 1) // 2 + 1):
+        ring = range(len(fits) - period, len(fits))
+        back = max(_distance(fits[k], fits[k - period], scale) for k in ring)
         if back < _SAME * max(strides[-period:]):
             return "cycling", f"cycling with period {period}: the passes repeat without settling", period
     if not strides:
@@ -191,18 +191,20 @@ def _distance(one: Regression, other: Regression, scale: Float) -> float:
     return float(np.max(np.abs(moved) * scale))
 
 
-def _bounded(R: Float, found: Regression, states: Float, inputs: Float, targets: Float) -> Float:
+def _bounded(R: Float, regression: Regression, states: Float, inputs: Float, targets: Float) -> Float:
     """R with its diagonal no smaller than half the residual variance of the last regression."""
-    residual = targets - states @ found.A.T - inputs @ found.B.T
+    residual = targets - states @ regression.A.T - inputs @ regression.B.T
     missing = np.maximum(0.5 * np.mean(residual**2, axis=0) - np.diag(R), 0.0)
     result: Float = R + np.diag(missing)
     return result
 
 
-def _filtered(vehicle: LinearVehicle, found: Regression, measured: Float, inputs: Float, R: Float) -> Filtered | None:
+def _filtered(
+    vehicle: LinearVehicle, regression: Regression, measured: Float, inputs: Float, R: Float
+) -> Filtered | None:
     """Step 2: the filter (3)-(5) with the last parameters; None where it does not exist."""
     P0 = vehicle.initial_covariance
-    system = vehicle.augmented(found.A, found.B)
+    system = vehicle.augmented(regression.A, regression.B)
     start = np.zeros(P0.shape[0])
     with np.errstate(all="ignore"):  # parameters that run away overflow here, which is reported
         try:
@@ -214,6 +216,6 @@ def _filtered(vehicle: LinearVehicle, found: Regression, measured: Float, inputs
 
 def _size(vehicle: LinearVehicle, W: Float, entering: Float, measured: Float) -> float:
     """Rms of what the disturbances do to measurements and states in a step, over the rms of the measurements."""
-    seen = np.sqrt(np.nanmean(np.square(measured), axis=0))
-    done = [np.sqrt(np.mean(np.square(W @ way.T), axis=0)) for way in (vehicle.carried, entering)]
-    return float(max(np.max(one / np.maximum(seen, 1e-300)) for one in done))
+    spread = np.sqrt(np.nanmean(np.square(measured), axis=0))
+    effects = [np.sqrt(np.mean(np.square(W @ way.T), axis=0)) for way in (vehicle.carried, entering)]
+    return float(max(np.max(effect / np.maximum(spread, 1e-300)) for effect in effects))

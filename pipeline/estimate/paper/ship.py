@@ -106,25 +106,25 @@ def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettin
         lateral_current(settings.current_std_m_s, current_rate),
     )
     R = noise_covariance(record, sampled.step_s)
-    given = ProcedureSettings(settings.iterations, settings.tolerance, settings.floor, settings.run_on)
-    return sampled, iterate(vehicle, sampled.measured, sampled.rudder[:, None], R, given)
+    procedure_settings = ProcedureSettings(settings.iterations, settings.tolerance, settings.floor, settings.run_on)
+    return sampled, iterate(vehicle, sampled.measured, sampled.rudder[:, None], R, procedure_settings)
 
 
-def percent_off(found: Hull, truth: Hull) -> dict[str, float]:
+def percent_off(hull: Hull, truth: Hull) -> dict[str, float]:
     """Return the errors of the six parameters in percent of the true ones, NaN where nothing was found."""
-    errors = 100.0 * (found.array() / truth.array() - 1.0)
+    errors = 100.0 * (hull.array() / truth.array() - 1.0)
     return dict(zip(HULL_PARAMETERS, (float(e) for e in errors), strict=True))
 
 
-def percent_std(found: Estimate, truth: Hull) -> dict[str, float]:
+def percent_std(estimate: Estimate, truth: Hull) -> dict[str, float]:
     """Return the standard errors of the six parameters in percent of the true ones."""
-    return {p.name: 100.0 * p.std / abs(float(t)) for p, t in zip(found.parameters, truth.array(), strict=True)}
+    return {p.name: 100.0 * p.std / abs(float(t)) for p, t in zip(estimate.parameters, truth.array(), strict=True)}
 
 
-def hull_of(one: ProcedurePass, sampled: Sampled) -> Hull:
+def hull_of(iteration: ProcedurePass, sampled: Sampled) -> Hull:
     """Return the continuous parameters of a pass; NaN where its matrices belong to no continuous ship."""
-    found = one.regression
-    hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
+    regression = iteration.regression
+    hull = continuous_from_discrete(regression.A, regression.B, sampled.speed_m_s, sampled.step_s)
     return hull if hull is not None else Hull(*[float("nan")] * 6)
 
 
@@ -159,20 +159,24 @@ def estimate_of(record: Record, sampled: Sampled, course: ProcedureCourse) -> Es
         tuple(warnings),
         converged=course.end == "converged",
         reason=course.reason,
-        iterations=tuple(_entry(count, one, sampled) for count, one in enumerate(course.passes)),
+        iterations=tuple(_entry(count, iteration, sampled) for count, iteration in enumerate(course.passes)),
     )
 
 
-def _entry(count: int, one: ProcedurePass, sampled: Sampled) -> dict[str, object]:
-    found = one.regression
-    values = [float(x) if np.isfinite(x) else None for x in hull_of(one, sampled).array()]
-    means = [None, None] if one.filtered is None else [float(x) for x in np.mean(one.filtered.updated[:, 2:4], axis=0)]
+def _entry(count: int, iteration: ProcedurePass, sampled: Sampled) -> dict[str, object]:
+    regression = iteration.regression
+    values = [float(x) if np.isfinite(x) else None for x in hull_of(iteration, sampled).array()]
+    means = (
+        [None, None]
+        if iteration.filtered is None
+        else [float(x) for x in np.mean(iteration.filtered.updated[:, 2:4], axis=0)]
+    )
     return {
         "iteration": count,
-        "A": [[float(x) for x in row] for row in found.A],
-        "B": [float(x) for x in found.B[:, 0]],
+        "A": [[float(x) for x in row] for row in regression.A],
+        "B": [float(x) for x in regression.B[:, 0]],
         **dict(zip(HULL_PARAMETERS, values, strict=True)),
         "mean_force_m_s2": means[0],
         "mean_current_m_s": means[1],
-        "change": None if count == 0 else one.change,
+        "change": None if count == 0 else iteration.change,
     }

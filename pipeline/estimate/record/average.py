@@ -32,12 +32,12 @@ def step_of(records: Sequence[Record], length_m: float | None) -> float:
         Of the ship; without it the legs of her zigzags say how fast she answers.
     """
     if length_m is None:
-        wanted = _STEP_LEGS * float(np.median([r.time_s[-1] / max(moves(r.rudder_rad), 1) for r in records]))
+        step = _STEP_LEGS * float(np.median([r.time_s[-1] / max(moves(r.rudder_rad), 1) for r in records]))
     else:
         speed = float(np.median([record.mean_speed_m_s for record in records]))
-        wanted = _STEP_LENGTHS * length_m / max(speed, 0.1)
+        step = _STEP_LENGTHS * length_m / max(speed, 0.1)
     fastest = min(_period(record) for record in records)
-    return float(f"{max(float(np.clip(wanted, _FINEST_S, _COARSEST_S)), fastest):.2g}")
+    return float(f"{max(float(np.clip(step, _FINEST_S, _COARSEST_S)), fastest):.2g}")
 
 
 def _period(record: Record) -> float:

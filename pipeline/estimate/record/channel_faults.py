@@ -64,12 +64,12 @@ def check_channels(window: Log) -> tuple[bool, tuple[str, ...]]:
     usable, warnings = True, []
     for finding in examination.findings:
         _refuse(finding)
-        said = f"{sentence(finding)}: {finding.evidence[0].words}"
+        warning = f"{sentence(finding)}: {finding.evidence[0].words}"
         if any(fault.kind == "stuck" for fault in finding.faults):
             usable = False
-            said += "; the channel is left out, the yaw rate is estimated through the heading"
-        warnings.append(said)
-    return usable, (*warnings, *(_doubt(one) for one in examination.outcomes if one.doubtful))
+            warning += "; the channel is left out, the yaw rate is estimated through the heading"
+        warnings.append(warning)
+    return usable, (*warnings, *(_doubt(outcome) for outcome in examination.outcomes if outcome.doubtful))
 
 
 def _doubt(outcome: Outcome) -> str:
@@ -96,9 +96,9 @@ def _code(fault: Fault) -> str | None:
     channel = fault.channels[0]
     if fault.kind == "offset" and fault.name.startswith("counted anticlockwise") and channel == "heading":
         return "heading_sign"
-    known = CODES.get((fault.kind, channel))
-    if known is not None or channel not in _DIRECTIONS:
-        return known
+    code = CODES.get((fault.kind, channel))
+    if code is not None or channel not in _DIRECTIONS:
+        return code
     if fault.kind == "unit" and channel != "course_over_ground":
         return "speed_unit"
     if fault.kind in ("sign", "unit", "swap", "frame") or (fault.kind == "offset" and abs(fault.value) > FARTHEST_RAD):

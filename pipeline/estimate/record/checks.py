@@ -165,7 +165,7 @@ def check_sway(lateral: LateralSpeed, heading: Series, rudder: Series, yaw_rate:
         Warnings.
     """
     time = lateral.time_utc_ns
-    K, r, delta = (one.at(time, gap_limit_s(one)) for one in (heading, yaw_rate, rudder))
+    K, r, delta = (series.at(time, gap_limit_s(series)) for series in (heading, yaw_rate, rudder))
     columns = np.column_stack([r, delta, np.ones(time.size), np.cos(K), np.sin(K)])
     good = np.isfinite(columns).all(axis=1) & np.isfinite(lateral.value_m_s)
     y = lateral.value_m_s[good]

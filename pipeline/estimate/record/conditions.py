@@ -84,7 +84,7 @@ def _wind(speed: Series, angle: Series, record: Record, at_ns: NDArray[np.int64]
     # the air past the ship, turned round, less what her own way makes of it
     parts = (speeds * np.cos(from_) - ahead * np.cos(heading), speeds * np.sin(from_) - ahead * np.sin(heading))
     signals = [signal(Series(time_ns, part)).series for part in parts]
-    x, y = (_laid(one, at_ns, gap_limit_s(one)) for one in signals)
+    x, y = (_laid(component, at_ns, gap_limit_s(component)) for component in signals)
     if x is None or y is None:
         return {"U": None, "gamma": None}
     heading, ahead = motion(at_ns)

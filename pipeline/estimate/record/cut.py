@@ -69,9 +69,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
-    usable, said = check_channels(_window(as_delivered, start_utc_ns, end_utc_ns))
+    usable, remarks = check_channels(_window(as_delivered, start_utc_ns, end_utc_ns))
     yaw = yaw if usable else None
-    warnings += said
+    warnings += remarks
     check_course(lateral)
     lateral = _without_jumps(lateral, warnings)
     moved = with_corners(without_noise(rudder, rudder_std), rudder_std)
@@ -216,18 +216,18 @@ def _cut_log(on_time: Punctual, as_delivered: Instruments, start_ns: int, end_ns
 
 
 def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
-    found = find_jumps(lateral)
-    count = int(np.count_nonzero(found.inside))
-    if found.unresolved:
+    jumps = find_jumps(lateral)
+    count = int(np.count_nonzero(jumps.inside))
+    if jumps.unresolved:
         warnings.append(
-            f"the GNSS velocity jumps {found.unresolved} times as no ship can, and nothing shows which side is right: "
+            f"the GNSS velocity jumps {jumps.unresolved} times as no ship can, and nothing shows which side is right: "
             "all of it is kept; look at the receiver"
         )
     if not count:
         return lateral
     warnings.append(f"{count} gross errors of lateral_speed left out before the fit: jumps of the GNSS velocity")
     sound = {
-        name: np.where(found.inside, np.nan, getattr(lateral, name))
+        name: np.where(jumps.inside, np.nan, getattr(lateral, name))
         for name in ("value_m_s", "std_m_s", "forward_m_s", "drift_rad")
     }
     return replace(lateral, **sound)

@@ -390,5 +390,5 @@ def spread(measured: Float) -> Float:
     measured : ndarray, shape (n, 3)
     """
     made = np.isfinite(measured).any(axis=0)
-    found: Float = np.where(made, np.nanstd(np.where(made, measured, 0.0), axis=0), 1.0)
-    return found
+    std: Float = np.where(made, np.nanstd(np.where(made, measured, 0.0), axis=0), 1.0)
+    return std

@@ -31,7 +31,7 @@ def loads(logs: Sequence[str], draughts_m: Mapping[str, float]) -> dict[str, flo
     >>> loads(["a", "b"], {"a": 8.0, "b": 10.0})
     {'a': 0.0, 'b': 2.5}
     """
-    if not logs or any(one not in draughts_m for one in logs):
-        return {one: float(number) for number, one in enumerate(logs)}
+    if not logs or any(log not in draughts_m for log in logs):
+        return {log: float(number) for number, log in enumerate(logs)}
     first = draughts_m[logs[0]]
-    return {one: _TENTHS * (draughts_m[one] - first) / first for one in logs}
+    return {log: _TENTHS * (draughts_m[log] - first) / first for log in logs}

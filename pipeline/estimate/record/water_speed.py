@@ -57,16 +57,16 @@ def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.
     if not mean_s > 0.0:
         return signal(log, shapes)
     means = [mean_about(Series(instants, shape), log.time_utc_ns, mean_s) for shape in shapes]
-    found = signal(log, means)
-    turning = 0.0 if found.shape is None else found.multiple * means[found.shape]
-    slow_means = found.series.value - turning
+    mean_signal = signal(log, means)
+    turning = 0.0 if mean_signal.shape is None else mean_signal.multiple * means[mean_signal.shape]
+    slow_means = mean_signal.series.value - turning
     slow = curve_of_means(Series(log.time_utc_ns, slow_means), instants)
-    whole = slow if found.shape is None else slow + found.multiple * shapes[found.shape]
+    whole = slow if mean_signal.shape is None else slow + mean_signal.multiple * shapes[mean_signal.shape]
     known = _within(instants, log, mean_s)
     straight = np.interp(instants.astype(np.float64), log.time_utc_ns.astype(np.float64), slow_means)
     missed = _MISSED * float(np.sqrt(np.mean((slow - straight)[known] ** 2)))
-    error_std = float(np.hypot(found.error_std, missed))
-    return replace(found, series=Series(instants[known], whole[known]), error_std=error_std)
+    error_std = float(np.hypot(mean_signal.error_std, missed))
+    return replace(mean_signal, series=Series(instants[known], whole[known]), error_std=error_std)
 
 
 def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
@@ -75,9 +75,9 @@ def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
     period_s = float(np.median(np.diff(instants))) / SECOND_NS
     shapes = []
     for legs in _LEGS:
-        kept = float(np.exp(-period_s / (legs * leg_s)))
+        decay = float(np.exp(-period_s / (legs * leg_s)))
         # at rest in the mean: what came before the segment is the spline's
-        shapes.append(filtered([1.0 - kept], [1.0, -kept], square - np.mean(square)))
+        shapes.append(filtered([1.0 - decay], [1.0, -decay], square - np.mean(square)))
     return [shape for shape in shapes if np.ptp(shape) > 0.0]
 
 

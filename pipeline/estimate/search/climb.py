@@ -177,29 +177,29 @@ def climb_by(
         if vain == _AT_THE_END:
             reason = "it still rises where the likelihood ends"
             break
-        found, far, ends = None, gain > _NEAR, False
+        point, far, ends = None, gain > _NEAR, False
         low, high = objective.room(theta, far=far)
         while damping < 1e9:
             step = steps.within(score, curvature, movable, damping, (low, high))
             step = np.clip(_shortened(step, theta, scale), low, high)
-            found, there, beyond = _risen(objective, theta, value, step)
+            point, there, beyond = _risen(objective, theta, value, step)
             ends = ends or beyond
-            if found is not None:
+            if point is not None:
                 break
             damping = max(10.0 * damping, _DAMPED)
-        if found is None:
+        if point is None:
             converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
             break
         damping = damping / 10.0 if damping > 1e-9 else 0.0
         vain = vain + 1 if ends and there[0] - value < _VAIN * gain else 0
         if gain < _LITTLE:
-            found, there = _sunk(objective, theta, found, there)
+            point, there = _sunk(objective, theta, point, there)
         if far and there[0] - value > _KEPT * gain:
             curvature = there[2]
         else:
-            made = there[2] if far else curvature
-            curvature = steps.corrected(made, information, there[2], found - theta, score - there[1], movable)
-        theta, (value, score, information) = found, there
+            base = there[2] if far else curvature
+            curvature = steps.corrected(base, information, there[2], point - theta, score - there[1], movable)
+        theta, (value, score, information) = point, there
         passes.append(Pass(theta, value, gain, damping))
         report(passes[-1])
     return Search(theta, value, score, information, converged, reason, tuple(passes))
@@ -224,19 +224,19 @@ def _risen(
 
 
 def _sunk(
-    objective: Objective[C], theta: Float, found: Float, there: tuple[float, Float, C]
+    objective: Objective[C], theta: Float, point: Float, there: tuple[float, Float, C]
 ) -> tuple[Float, tuple[float, Float, C]]:
     """Let levels that sink go to their lower bounds at once, where that is higher still.
 
     The log-likelihood goes with the square of a level near nothing, so that by its logarithm every step goes only a
     part of the way, and the same part again.
     """
-    sinking: Mask = (found - theta < -_SINKING) & (there[1] < 0.0) & (found > objective.low) & objective.logarithms
+    sinking: Mask = (point - theta < -_SINKING) & (there[1] < 0.0) & (point > objective.low) & objective.logarithms
     if not sinking.any():
-        return found, there
-    bottom = np.where(sinking, objective.low, found)
+        return point, there
+    bottom = np.where(sinking, objective.low, point)
     lower = objective.full(bottom)
-    return (bottom, lower) if lower[0] > there[0] else (found, there)
+    return (bottom, lower) if lower[0] > there[0] else (point, there)
 
 
 def _shortened(step: Float, theta: Float, scale: Float) -> Float:

@@ -53,25 +53,25 @@ def climb_in_variances(
     """
     inside = _InVariances(pool)
 
-    def by_logarithms(one: Pass) -> Pass:
-        return replace(one, theta=inside.logarithms_of(one.theta))
+    def by_logarithms(step: Pass) -> Pass:
+        return replace(step, theta=inside.logarithms_of(step.theta))
 
-    found = climb_by(
+    search = climb_by(
         ArrowSteps(),
         inside,
         inside.variances(start),
         max_iterations,
         decrement,
         wanted,
-        lambda one: report(by_logarithms(one)),
+        lambda step: report(by_logarithms(step)),
     )
-    factors = 1.0 / inside.factors(found.theta)
+    factors = 1.0 / inside.factors(search.theta)
     return replace(
-        found,
-        theta=inside.logarithms_of(found.theta),
-        score=found.score * factors,
-        information=found.information.scaled(factors),
-        passes=tuple(by_logarithms(one) for one in found.passes),
+        search,
+        theta=inside.logarithms_of(search.theta),
+        score=search.score * factors,
+        information=search.information.scaled(factors),
+        passes=tuple(by_logarithms(step) for step in search.passes),
     )
 
 

@@ -223,15 +223,15 @@ class _DecodeJob:
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
         """Decode the messages of one channel."""
         batch = part.batch
-        done = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
-        part.reason[record[~done.good]] = CODE[Reason.MALFORMED]
-        if done.time_ns is not None:
-            timed = done.time_ns >= 0
+        decoded = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
+        if decoded.time_ns is not None:
+            timed = decoded.time_ns >= 0
             self.timed |= bool(timed.any())
-            part.time_ns[record[timed]] = done.time_ns[timed]
-            if not timed[done.good].all():
+            part.time_ns[record[timed]] = decoded.time_ns[timed]
+            if not timed[decoded.good].all():
                 self.untimed.add(topic)
-        for key, (value, present) in done.values.items():
+        for key, (value, present) in decoded.values.items():
             mapped = route.mapped[key]
             if present.any():
                 self.seen.setdefault(topic, set()).add(key)

@@ -44,9 +44,9 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
         schema = stream.schemas.get(channel.schema)
         kind = plain_name(schema.name) if schema else ""
         known: dict[str, ChannelMap] = TAKEN.get(kind, {}) | OFFERED.get(kind, {})
-        found: Fields = dict(known)
-        found.update(dict.fromkeys(k for k in numbers_of(channel, schema, first.get(number)) if k not in found))
-        topics.setdefault(channel.topic, {}).update(found)
+        fields: Fields = dict(known)
+        fields.update(dict.fromkeys(k for k in numbers_of(channel, schema, first.get(number)) if k not in fields))
+        topics.setdefault(channel.topic, {}).update(fields)
     return dict(sorted(topics.items()))
 
 

@@ -80,8 +80,8 @@ def types_of(name: str, definition: str) -> Types:
     texts = dict(_KNOWN)
     first, *others = _SEPARATOR.split(definition)
     texts[full_name(name, "")] = first
-    for other in others:
-        head, _, body = other.lstrip().partition("\n")
+    for part in others:
+        head, _, body = part.lstrip().partition("\n")
         if head.startswith(("MSG:", "IDL:")):
             texts[full_name(head[4:].strip(), "")] = body
     types = {own: _fields(text, own.split("/")[0]) for own, text in texts.items()}

@@ -132,13 +132,15 @@ def _delays(
 ) -> Nanoseconds:
     """Return what is added to the time of the fix for the sentences that share it with others of their source."""
     source = np.full(own.size, -1, dtype=np.int64)
-    for name, what in said.items():
-        good = (what.reason == 0) & (own[what.record] == NO_TIME) & (carried[what.record] != NO_TIME)
+    for name, sentences in said.items():
+        good = (sentences.reason == 0) & (own[sentences.record] == NO_TIME) & (carried[sentences.record] != NO_TIME)
         # an instrument may send roll and pitch in two sentences of one address: these are one measurement
         kinds = (
-            [there.astype(np.int64) << k for k, (_, there) in enumerate(what.values.values())] if name == "XDR" else []
+            [there.astype(np.int64) << k for k, (_, there) in enumerate(sentences.values.values())]
+            if name == "XDR"
+            else []
         )
-        source[what.record] = np.where(good, frames.address[what.record] * 4 + sum(kinds), -1)
+        source[sentences.record] = np.where(good, frames.address[sentences.record] * 4 + sum(kinds), -1)
     record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
     delay, shared = _spread(own[at], at, record, source[record], follows=follows)
     delays = np.zeros(own.size, dtype=np.int64)
@@ -155,16 +157,16 @@ def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]
     n = len(frames.lines)
     of_day, midnight = np.full(n, NO_TIME, dtype=np.int64), np.full(n, NO_TIME, dtype=np.int64)
     void = np.zeros(n, dtype=np.bool_)
-    for name, what in said.items():
-        sentence, fields = SENTENCES[name], what.fields
+    for name, sentences in said.items():
+        sentence, fields = SENTENCES[name], sentences.fields
         if sentence.utc is None:
             continue
-        of_day[what.record] = time_of_day(fields.at(sentence.utc))
-        void[what.record] = what.reason == CODE[Reason.VOID]
+        of_day[sentences.record] = time_of_day(fields.at(sentence.utc))
+        void[sentences.record] = sentences.reason == CODE[Reason.VOID]
         if sentence.date is not None:
-            midnight[what.record] = date(fields.at(sentence.date))
+            midnight[sentences.record] = date(fields.at(sentence.date))
         elif name == "ZDA":
-            midnight[what.record] = year_month_day(fields.at(4), fields.at(3), fields.at(2))
+            midnight[sentences.record] = year_month_day(fields.at(4), fields.at(3), fields.at(2))
     dated = (of_day != NO_TIME) & (midnight != NO_TIME)
     full = np.where(dated, midnight + of_day, NO_TIME)
     full, late = _correct_rollover(full, dated, frames.stamp_ns)

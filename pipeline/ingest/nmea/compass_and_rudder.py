@@ -82,8 +82,8 @@ def make_true(frames: Frames, said: dict[str, Said], variation_deg: float | None
             )
         # what is beyond one turn is not brought onto the circle here: nonsense would look like a heading
         known = (magnetic >= CHANNELS["heading"].low) & (magnetic <= CHANNELS["heading"].high)
-        made = np.mod(np.where(known, magnetic, 0.0) + variation, 2.0 * np.pi)
-        said[name].values["heading"] = (np.where(known, made, magnetic + variation), there)
+        true_heading = np.mod(np.where(known, magnetic, 0.0) + variation, 2.0 * np.pi)
+        said[name].values["heading"] = (np.where(known, true_heading, magnetic + variation), there)
     return notes
 
 

@@ -52,16 +52,16 @@ def decode(data: bytes, corrections: Corrections = _NONE, variation_deg: float |
     reason[(kind < 0) & (reason == 0)] = CODE[Reason.NO_CHANNEL]
     notes = [*both_rudders(frames, said), *make_true(frames, said, variation_deg)]
     channels: dict[str, Values] = {}
-    for what in said.values():
-        reason[what.record] = what.reason
-        for channel, (read_value, there) in what.values.items():
+    for sentences in said.values():
+        reason[sentences.record] = sentences.reason
+        for channel, (read_value, there) in sentences.values.items():
             value = read_value
-            put = there & (what.reason == 0)
+            put = there & (sentences.reason == 0)
             for address, (factor, offset) in corrections.get(channel, {}).items():
                 if address in frames.names:
-                    mine = frames.address[what.record] == frames.names.index(address)
+                    mine = frames.address[sentences.record] == frames.names.index(address)
                     value = np.where(mine, value * factor + offset, value)
-            channels.setdefault(channel, Values.empty(n)).put(what.record[put], value[put])
+            channels.setdefault(channel, Values.empty(n)).put(sentences.record[put], value[put])
     clock = clock_of(frames, said)
     unread = (frames.reason == CODE[Reason.CHECKSUM]) | (frames.reason == CODE[Reason.MALFORMED])
     time = np.where(unread, NO_TIME, clock.time_utc_ns)
@@ -100,7 +100,7 @@ def _notes(frames: Frames, kind: Index, reason: Code) -> list[str]:
         own = int(sum(count[code] for code, name in enumerate(frames.names) if name.startswith("P")))
         encapsulated = int(np.sum(without & (_opening(frames) == ord("!"))))
         shown = ", ".join(used[:12]) + (" ..." if len(used) > 12 else "")
-        kinds = [f"{n} {what}" for n, what in ((own, "proprietary"), (encapsulated, "AIS or encapsulated")) if n]
+        kinds = [f"{n} {label}" for n, label in ((own, "proprietary"), (encapsulated, "AIS or encapsulated")) if n]
         behind = f"; of them {', '.join(kinds)}" if kinds else ""
         notes.append(f"Sentences without a channel: {shown}{behind}.")
     return notes

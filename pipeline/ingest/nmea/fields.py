@@ -51,8 +51,8 @@ class Fields:
         if self._fewest < place:
             there = self.count >= place
             start, end = np.where(there, start, stop), np.where(there, end, stop)
-        made = Cells.of if self.frames.padded else Cells
-        return made(self.frames.body.buffer, start, end)
+        constructor = Cells.of if self.frames.padded else Cells
+        return constructor(self.frames.body.buffer, start, end)
 
     @cached_property
     def _stop(self) -> Index:

@@ -76,7 +76,7 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         assert column.interval_s is not None
         every = np.ones(row.size, dtype=np.bool_)
         return RowTimes(_counted(row, column.interval_s) + start, every, every, [])
-    stated = np.logical_and.reduce([cells[one].is_not_null().to_numpy() for one in column.columns])
+    stated = np.logical_and.reduce([cells[key].is_not_null().to_numpy() for key in column.columns])
     notes: list[str] = []
     if column.date is not None and column.time is not None:
         instant, good = _of_two(cells[column.date], cells[column.time], column, notes)
@@ -94,9 +94,9 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         return RowTimes(instant, good, stated, notes)
     first = _first_row(name, instant[good], row[good], column.interval_s)
     every = np.ones(row.size, dtype=np.bool_)
-    said = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says"
+    note = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says"
     shown = f"; the column agrees within {_resolution_s(instant[good]):.4g} s." if np.ptp(instant[good]) else "."
-    return RowTimes(_counted(row, column.interval_s) + first, every, every, [*notes, said + shown])
+    return RowTimes(_counted(row, column.interval_s) + first, every, every, [*notes, note + shown])
 
 
 def _counted(row: Index, interval_s: float) -> Nanoseconds:

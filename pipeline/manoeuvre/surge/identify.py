@@ -43,18 +43,18 @@ def surge_of(runs: Sequence[GridRun], length_m: float, rudder_speed_exponent: fl
     logs = [log for log in (LoggedSpeed.of(run, length_m, rudder_speed_exponent) for run in runs) if log is not None]
     if not logs:
         return _of_usual_ships(("the speed in turns is a guess: no log shows it",))
-    made = posterior_of(logs, _forms(logs))
-    best = int(np.argmax(made.probability))
-    own = BY_DRIFT if made.loss[best, BY_DRIFT] != 0.0 else BY_RATE
-    unit = made.tau[best] if own == BY_DRIFT else 1.0
-    if np.sqrt(made.covariance[best, own, own]) > _FROM_PRIOR * LOSS_STD[own] * unit:
+    fit = posterior_of(logs, _forms(logs))
+    best = int(np.argmax(fit.probability))
+    own = BY_DRIFT if fit.loss[best, BY_DRIFT] != 0.0 else BY_RATE
+    unit = fit.tau[best] if own == BY_DRIFT else 1.0
+    if np.sqrt(fit.covariance[best, own, own]) > _FROM_PRIOR * LOSS_STD[own] * unit:
         words = "k_vr / tau of" if own == BY_DRIFT else "k_r of"
         remark = (
             "the logs hardly show what a turn costs of her speed: the loss is that of usual ships, "
             f"{words} {LOSS_MEAN[own]:g} ± {LOSS_STD[own]:g}"
         )
-        return replace(made, remarks=(remark,))
-    return made
+        return replace(fit, remarks=(remark,))
+    return fit
 
 
 def _forms(logs: Sequence[LoggedSpeed]) -> list[tuple[int, ...]]:
@@ -62,7 +62,7 @@ def _forms(logs: Sequence[LoggedSpeed]) -> list[tuple[int, ...]]:
     turning: list[tuple[int, ...]] = [(BY_RATE,)]
     if all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs):
         turning = [(BY_DRIFT,), (BY_DRIFT, BY_RATE), *turning]
-    forms = [kinds for one in turning for kinds in (one, (*one, BY_RUDDER))]
+    forms = [kinds for form in turning for kinds in (form, (*form, BY_RUDDER))]
     if all(np.isfinite(log.costs[:, BY_WIND]).all() for log in logs):
         forms += [(*kinds, BY_WIND) for kinds in forms]
     return forms

@@ -18,14 +18,14 @@ def _head_wind(run: GridRun) -> Float:
     if not {"wind_speed", "wind_angle"} <= set(run.channels):
         return np.full(run.speed_m_s.size, np.nan)
     over_deck = _channel(run, "wind_speed")
-    found: Float = over_deck**2 * np.cos(_channel(run, "wind_angle")) - run.speed_m_s**2
-    return found
+    wind: Float = over_deck**2 * np.cos(_channel(run, "wind_angle")) - run.speed_m_s**2
+    return wind
 
 
 def _channel(run: GridRun, name: str) -> Float:
     column = 2 + list(CHANNEL_SYMBOLS.values()).index(name)
-    found: Float = run.inputs[:: (run.inputs.shape[0] - 1) // (run.speed_m_s.size - 1), column]
-    return found
+    values: Float = run.inputs[:: (run.inputs.shape[0] - 1) // (run.speed_m_s.size - 1), column]
+    return values
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +65,14 @@ class LoggedSpeed:
         It is in lengths at the speed of this log, or of ``reference_m_s``.
         """
         step = self.step if reference_m_s is None else self.step * reference_m_s / self.settled_m_s
-        kept = np.exp(-step / tau)
+        decay = np.exp(-step / tau)
 
         def lagged(course: Float) -> Float:
             mean = 0.5 * (course[1:] + course[:-1])
-            found: Float = np.concatenate([[0.0], filtered([1.0 - kept], [1.0, -kept], mean)])
-            return found
+            response: Float = np.concatenate([[0.0], filtered([1.0 - decay], [1.0, -decay], mean)])
+            return response
 
-        own = np.column_stack([lagged(self.shaft), kept ** np.arange(self.speed.size)])
+        own = np.column_stack([lagged(self.shaft), decay ** np.arange(self.speed.size)])
         lost = np.column_stack([-lagged(self.costs[:, j]) for j in KINDS])
         return own, lost
 

@@ -47,7 +47,7 @@ def posterior_of(logs: Sequence[LoggedSpeed], forms: Sequence[tuple[int, ...]]) 
     count = sum(e.size for e in left)
     error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
-    reduced = [[_Reduced.of(log, one, variance) for log, one in zip(logs, own, strict=True)] for own in columns]
+    reduced = [[_Reduced.of(log, pair, variance) for log, pair in zip(logs, own, strict=True)] for own in columns]
     parts = [
         (reference, tau, kinds, _solved(own, tau, kinds))
         for kinds in forms
@@ -62,10 +62,10 @@ def posterior_of(logs: Sequence[LoggedSpeed], forms: Sequence[tuple[int, ...]]) 
     for k, (_, _, kinds, solved) in enumerate(parts):
         loss[k, kinds] = solved.mean
         covariance[k][np.ix_(kinds, kinds)] = solved.covariance
-    kept = np.array(parts[int(np.argmax(p))][3].settled)
+    ratios = np.array(parts[int(np.argmax(p))][3].settled)
     by_time = np.array([part[0] is not None for part in parts])
     return SurgeFit(
-        *(tau, p, loss, covariance, (float(np.mean(kept)), float(np.std(kept))), error * mean, ()),
+        *(tau, p, loss, covariance, (float(np.mean(ratios)), float(np.std(ratios))), error * mean, ()),
         by_time=by_time,
         reference_m_s=mean,
     )
@@ -140,19 +140,19 @@ def _freed(logs: Sequence[LoggedSpeed], columns: Columns) -> Columns:
 
     So the losses alone are to be solved for (Frisch & Waugh 1933).
     """
-    found = []
+    residuals = []
     for log, (own, lost) in zip(logs, columns, strict=True):
         base = np.linalg.qr(own)[0]
-        found.append((log.speed - base @ (base.T @ log.speed), lost - base @ (base.T @ lost)))
-    return found
+        residuals.append((log.speed - base @ (base.T @ log.speed), lost - base @ (base.T @ lost)))
+    return residuals
 
 
 def _left(freed: Columns, kinds: Sequence[int]) -> list[Float]:
     """Return what the model leaves of every log's speed, without priors; see `_freed`."""
     chosen = [(speed, lost[:, list(kinds)]) for speed, lost in freed]
     whole, right = np.vstack([lost for _, lost in chosen]), np.concatenate([speed for speed, _ in chosen])
-    found = lstsq(whole, right, rcond=1e-10)[0]
-    return [speed - lost @ found for speed, lost in chosen]
+    coefficients = lstsq(whole, right, rcond=1e-10)[0]
+    return [speed - lost @ coefficients for speed, lost in chosen]
 
 
 def _memory(left: Sequence[Float]) -> float:
@@ -160,10 +160,10 @@ def _memory(left: Sequence[Float]) -> float:
     total = sum(float(e @ e) for e in left)
     if total <= 0.0:
         return 1.0
-    found = 1.0
+    count = 1.0
     for lag in range(1, _LAGS):
         correlation = sum(float(e[lag:] @ e[:-lag]) for e in left if e.size > lag) / total
         if correlation < 0.05:
             break
-        found += 2.0 * correlation
-    return found
+        count += 2.0 * correlation
+    return count

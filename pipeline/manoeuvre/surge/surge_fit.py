@@ -70,7 +70,7 @@ class SurgeFit:
     def drawn(self, normal: Float) -> Float:
         """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
         part = np.searchsorted(np.cumsum(self.probability), normal_up_to(normal[:, 0]) * (1.0 - 1e-12))
-        found = np.empty((len(normal), 5))
+        draws = np.empty((len(normal), 5))
         roots: dict[int, tuple[list[int], Float]] = {}
         for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1).tolist(), normal[:, 1:], strict=True)):
             if k not in roots:
@@ -78,8 +78,8 @@ class SurgeFit:
             kinds, root = roots[k]
             loss = self.loss[k].copy()
             loss[kinds] += root @ z[: len(kinds)]
-            found[i] = [self.tau[k], *_costing(loss)]
-        return found
+            draws[i] = [self.tau[k], *_costing(loss)]
+        return draws
 
     def _root(self, k: int) -> tuple[list[int], Float]:
         """Return the kinds of loss of a part and the square root of their covariance."""
@@ -90,7 +90,7 @@ class SurgeFit:
 
 def _costing(loss: Float) -> Float:
     """Return losses that cost speed; beside drift the yaw rate squared may give some."""
-    found: Float = np.maximum(loss, 0.0)
-    if found[BY_DRIFT] > 0.0:
-        found[BY_RATE] = loss[BY_RATE]
-    return found
+    costs: Float = np.maximum(loss, 0.0)
+    if costs[BY_DRIFT] > 0.0:
+        costs[BY_RATE] = loss[BY_RATE]
+    return costs

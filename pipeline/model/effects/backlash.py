@@ -13,8 +13,8 @@ def rudder_course(time_s: Float, rudder_rad: Float, width: float) -> Float:
 
     ``width``: whole width of the play, rad.
     """
-    taken: Float = _taken(np.ascontiguousarray(rudder_rad), 0.5 * width)
-    return taken
+    course: Float = _taken(np.ascontiguousarray(rudder_rad), 0.5 * width)
+    return course
 
 
 @njit(cache=True, nogil=True)

@@ -68,8 +68,8 @@ def names_in(text: str) -> list[str]:
     """
     tree = _parsed(text)
     called = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node not in called]
-    return list(dict.fromkeys(n.id for n in sorted(found, key=lambda n: (n.lineno, n.col_offset))))
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node not in called]
+    return list(dict.fromkeys(n.id for n in sorted(nodes, key=lambda n: (n.lineno, n.col_offset))))
 
 
 def compiled(text: str, variables: Mapping[str, int]) -> Program:
@@ -235,8 +235,8 @@ class _Writing:
         elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             self._write_call(node, node.func.id, height)
         else:
-            what = _WORDS.get(type(node), "this")
-            raise _wrong(self.text, node.col_offset + 1, f"{what} may not stand in a formula")
+            phrase = _WORDS.get(type(node), "this")
+            raise _wrong(self.text, node.col_offset + 1, f"{phrase} may not stand in a formula")
 
     def _write_call(self, node: ast.Call, name: str, height: int) -> None:
         if name not in FUNCTIONS:

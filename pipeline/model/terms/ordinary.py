@@ -153,20 +153,20 @@ def _typical(effect: Effect, k: int) -> dict[str, float]:
     return {p.name: p.steps[min(k, len(p.steps) - 1)] for p in effect.parameters}
 
 
-def _require_finite(effect: Effect, place: Place, found: Answer, parameters: Mapping[str, float]) -> None:
-    good_value = np.isfinite(found.value)
-    good = good_value & np.isfinite(found.slope).all(axis=1)
+def _require_finite(effect: Effect, place: Place, response: Answer, parameters: Mapping[str, float]) -> None:
+    good_value = np.isfinite(response.value)
+    good = good_value & np.isfinite(response.slope).all(axis=1)
     if good.all():
         return
     k = int(np.flatnonzero(~good)[0])
-    what = "value" if not good_value[k] else "slope"
+    quantity = "value" if not good_value[k] else "slope"
     state = dict(zip(_COLUMNS, _STATES[k], strict=True))
     at = ", ".join(
         [f"{name} = {state[name]:g}" for name in _SHOWN] + [f"{n} = {x:g}" for n, x in parameters.items() if x != 0.0]
     )
     raise UsageError(
         "effect_not_finite",
-        f"The expression {place.text[:80]!r} for {place.name} has no finite {what} at {at}: an ordinary state.",
+        f"The expression {place.text[:80]!r} for {place.name} has no finite {quantity} at {at}: an ordinary state.",
         "Keep what it divides by, or takes the root or logarithm of, away from 0: max(V, 0.1), sqrt(v**2 + 0.01).",
         {"effect": effect.name, "place": place.name, "state": state},
     )

@@ -57,8 +57,8 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
     """
     _require_name(name)
     terms = _terms([texts] if isinstance(texts, str) else texts)
-    found = dict.fromkeys(n for text in terms.values() for n in names_in(text))
-    unknown = [n for n in found if _UNKNOWN.fullmatch(n)]
+    names = dict.fromkeys(n for text in terms.values() for n in names_in(text))
+    unknown = [n for n in names if _UNKNOWN.fullmatch(n)]
     if not unknown:
         unknown, terms = ["c"], {target: f"c*({text})" for target, text in terms.items()}
     if len(unknown) > _MOST_UNKNOWN:
@@ -171,7 +171,10 @@ def _terms(texts: Sequence[str]) -> dict[str, str]:
             )
         _require_known(target, text.strip())
         parts.setdefault(target, []).append(text.strip())
-    return {t: found[0] if len(found) == 1 else " + ".join(f"({f})" for f in found) for t, found in parts.items()}
+    return {
+        t: formulas[0] if len(formulas) == 1 else " + ".join(f"({f})" for f in formulas)
+        for t, formulas in parts.items()
+    }
 
 
 def _require_known(target: str, text: str) -> None:

@@ -46,12 +46,12 @@ def parameters_of(terms: Mapping[str, str], names: Sequence[str]) -> tuple[Param
         shapes.append(idle[-1])
     best = {name: _telling(terms, name, names) for name in shapes}
     makers = [n for n in names if n not in shapes]
-    found = [_maker(terms, name, {**dict.fromkeys(names, 0.0), **best}) for name in makers]
+    parameters = [_maker(terms, name, {**dict.fromkeys(names, 0.0), **best}) for name in makers]
     for name in (n for n in names if n in shapes):
         steps = tuple(_rounded(best[name] * factor) for factor in (0.3, 1.0, 3.0))
         low, high = steps[1] / _REACH, steps[1] * _REACH
-        found.append(Parameter(name=name, low=low, high=high, steps=steps, meaning=f"{_MEANING}, positive"))
-    return tuple(found)
+        parameters.append(Parameter(name=name, low=low, high=high, steps=steps, meaning=f"{_MEANING}, positive"))
+    return tuple(parameters)
 
 
 def _with(names: Sequence[str], shapes: Sequence[str]) -> dict[str, float]:

@@ -54,12 +54,12 @@ class Place:
 
 def places(effect: Effect) -> list[Place]:
     """Return every expression of an effect: terms in the order given, then its states."""
-    found = [Place(target, KINDS[target], text) for target, text in effect.terms.items()]
+    expressions = [Place(target, KINDS[target], text) for target, text in effect.terms.items()]
     for state in effect.states:
-        found.append(Place(f"{state.name}.derivative", "force", state.derivative))
-        found.append(Place(f"{state.name}.noise", "noise", state.noise))
-        found.append(Place(f"{state.name}.initial_std", "noise", state.initial_std))
-    return found
+        expressions.append(Place(f"{state.name}.derivative", "force", state.derivative))
+        expressions.append(Place(f"{state.name}.noise", "noise", state.noise))
+        expressions.append(Place(f"{state.name}.initial_std", "noise", state.initial_std))
+    return expressions
 
 
 def allowed(kind: Kind, own_states: tuple[str, ...] = ()) -> tuple[str, ...]:

@@ -31,7 +31,11 @@ def encoded(start_utc_ns: int, end_utc_ns: int, shown: Mapping[str, Shown]) -> b
     # as text: JavaScript's numbers cannot hold nanoseconds
     head = json.dumps({"from_utc_ns": str(start_utc_ns), "to_utc_ns": str(end_utc_ns), "series": series})
     padded = head + " " * (-(len(head) + 1) % 4) + "\n"
-    parts = [np.asarray(part, dtype="<f4").tobytes() for one in shown.values() for part in (one.time_s, one.value)]
+    parts = [
+        np.asarray(part, dtype="<f4").tobytes()
+        for channel in shown.values()
+        for part in (channel.time_s, channel.value)
+    ]
     return padded.encode("ascii") + b"".join(parts)
 
 
@@ -39,9 +43,9 @@ def decoded(answer: bytes) -> tuple[dict[str, Any], dict[str, tuple[Float, Float
     """Return the header of an answer, and seconds and values by channel."""
     line, _, rest = answer.partition(b"\n")
     head = json.loads(line)
-    numbers, found, at = np.frombuffer(rest, dtype="<f4").astype(np.float64), {}, 0
-    for one in head["series"]:
-        n = one["count"]
-        found[one["name"]] = (numbers[at : at + n], numbers[at + n : at + 2 * n])
+    numbers, channels, at = np.frombuffer(rest, dtype="<f4").astype(np.float64), {}, 0
+    for entry in head["series"]:
+        n = entry["count"]
+        channels[entry["name"]] = (numbers[at : at + n], numbers[at + n : at + 2 * n])
         at += 2 * n
-    return head, found
+    return head, channels

@@ -51,8 +51,8 @@ class KeptPrediction:
 
     def marked(self, segment_id: str, evidence: str | None) -> Mask | None:
         """Return at which instants of a manoeuvre a piece of evidence shows, shape (n,); None where it is not its."""
-        found = self.columns[segment_id].get(f"{MARK}{evidence}")
-        return None if found is None else found.astype(np.bool_)
+        mark = self.columns[segment_id].get(f"{MARK}{evidence}")
+        return None if mark is None else mark.astype(np.bool_)
 
 
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:
@@ -61,26 +61,26 @@ def key_of(state: VesselState, set_id: str, horizon: str) -> str:
     return sha256(canonical_json([state.vessel, set_id, horizon, rests_on]))[:24]
 
 
-def keep(state: Path, key: str, found: Comparison) -> None:
+def keep(state: Path, key: str, comparison: Comparison) -> None:
     """Keep a prediction."""
     from kempf.pipeline.compare.run_series import run_series
 
     folder = state / "predictions"
     folder.mkdir(parents=True, exist_ok=True)
-    where = found.where()
-    document = json.dumps({**found.show(), "where": where})
+    where = comparison.where()
+    document = json.dumps({**comparison.show(), "where": where})
     columns: dict[str, NDArray[Any]] = {
-        f"{run.name}/{name}": values for run in found.runs for name, values in run_series(run).items()
+        f"{run.name}/{name}": values for run in comparison.runs for name, values in run_series(run).items()
     }
-    for evidence, by_run in found.marks(evidence_in(where)).items():
+    for evidence, by_run in comparison.marks(evidence_in(where)).items():
         columns |= {f"{name}/{MARK}{evidence}": inside for name, inside in by_run.items()}
     part = folder / f"{key}.{os.getpid()}.part"
     with part.open("wb") as file:
         np.savez(file, allow_pickle=False, document=np.frombuffer(document.encode(), dtype=np.uint8), **columns)
     part.replace(folder / f"{key}.npz")
-    held = sorted(folder.glob("*.npz"), key=lambda one: (one.stat().st_mtime_ns, one.name))
-    for one in held[:-_MOST]:
-        one.unlink()
+    held = sorted(folder.glob("*.npz"), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    for path in held[:-_MOST]:
+        path.unlink()
 
 
 def kept_of(

@@ -21,12 +21,12 @@ SIDES = ("starboard", "port")
 _SHIPS, _POINTS = 24, 120
 
 
-def request_of(asked: Mapping[str, Any]) -> PredictRequest:
+def request_of(fields: Mapping[str, Any]) -> PredictRequest:
     """Return what the fields of a form ask for; one that is blank takes what is usual.
 
     Parameters
     ----------
-    asked : mapping of str to str
+    fields : mapping of str to str
         ``manoeuvre``, ``set``, ``rudder``, ``angles``, ``side``, ``speed``.
 
     Raises
@@ -35,16 +35,16 @@ def request_of(asked: Mapping[str, Any]) -> PredictRequest:
         ``manoeuvre_unknown``, ``side_unknown``, ``number_unreadable``, ``angles_unreadable``; and what
         `kempf.flows.jobs.predict_request.required` raises.
     """
-    kind, side = asked["manoeuvre"] or MANOEUVRES[0], asked["side"] or SIDES[0]
+    kind, side = fields["manoeuvre"] or MANOEUVRES[0], fields["side"] or SIDES[0]
     if kind not in MANOEUVRES:
         raise UsageError(
             "manoeuvre_unknown", f"{kind[:40]!r} cannot be predicted.", f"Choose one of {', '.join(MANOEUVRES)}."
         )
     if side not in SIDES:
         raise UsageError("side_unknown", f"{side[:40]!r} is no side.", "Choose starboard or port.")
-    rudder, speed = number_of(asked["rudder"], "rudder"), number_of(asked["speed"], "speed")
-    angles = angles_of(asked["angles"] or "20/20")
-    request = PredictRequest(cast(Kind, kind), asked["set"] or None, rudder, angles, cast(Any, side), speed)
+    rudder, speed = number_of(fields["rudder"], "rudder"), number_of(fields["speed"], "speed")
+    angles = angles_of(fields["angles"] or "20/20")
+    request = PredictRequest(cast(Kind, kind), fields["set"] or None, rudder, angles, cast(Any, side), speed)
     required(request)
     return request
 
@@ -62,15 +62,15 @@ def angles_of(text: str) -> tuple[float, float]:
     >>> angles_of("20/10")
     (20.0, 10.0)
     """
-    found = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,9})?)\s*/\s*(\d{1,3}(?:\.\d{1,9})?)\s*", text)
-    if found is None:
+    match = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,9})?)\s*/\s*(\d{1,3}(?:\.\d{1,9})?)\s*", text)
+    if match is None:
         raise UsageError(
             "angles_unreadable", f"{text[:60]!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
         )
-    return float(found[1]), float(found[2])
+    return float(match[1]), float(match[2])
 
 
-def curves_of(made: Prediction) -> dict[str, list[list[list[float]]]]:
+def curves_of(prediction: Prediction) -> dict[str, list[list[list[float]]]]:
     """Return what ships do as JSON content: points of each, columns as `kempf.pipeline.manoeuvre.sailed` has them.
 
     Returns
@@ -78,11 +78,11 @@ def curves_of(made: Prediction) -> dict[str, list[list[list[float]]]]:
     dict
         ``estimates``: one curve a model, the one asked for first; ``ships``: some that the data allow.
     """
-    drawn = made.drawn
+    drawn = prediction.drawn
     chosen = drawn[:: max(1, -(-len(drawn) // _SHIPS))]
     return {
-        "estimates": [_thinned(one.sailed.curve) for one in made.models if one.sailed is not None],
-        "ships": [_thinned(one.curve) for one in chosen],
+        "estimates": [_thinned(model.sailed.curve) for model in prediction.models if model.sailed is not None],
+        "ships": [_thinned(ship.curve) for ship in chosen],
     }
 
 

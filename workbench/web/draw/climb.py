@@ -45,8 +45,8 @@ def draw_climb(figures: Sequence[Figures]) -> Markup:
     figures : sequence of Figures
         Of the iterations to be shown.
     """
-    likelihoods = [(one, one.log_likelihood) for one in figures]
-    errors = [(one, 100.0 * one.error) for one in figures if one.error is not None]
+    likelihoods = [(iteration, iteration.log_likelihood) for iteration in figures]
+    errors = [(iteration, 100.0 * iteration.error) for iteration in figures if iteration.error is not None]
     parts = [
         _panel("log_likelihood", "log-likelihood", 6.0, figures, likelihoods),
         _panel("error", "error one step ahead, % of the motion", 6.0 + _PANEL + _GAP, figures, errors),
@@ -73,21 +73,21 @@ def _panel(
     first, last = (shown[0].iteration, shown[-1].iteration) if shown else (0, 0)
     width = _WIDTH - _LEFT - _RIGHT
     line, dots, climb = "", "", 0
-    for one, value in points:
-        x = _LEFT + width * (one.iteration - first) / max(last - first, 1)
+    for figures, value in points:
+        x = _LEFT + width * (figures.iteration - first) / max(last - first, 1)
         y = top + _PANEL * (high - min(max(value, low), high)) / (high - low)
-        if one.fitted:
+        if figures.fitted:
             dots += f"M{x:.1f} {y:.1f}h.01"
         else:
-            line += f"L{x:.1f} {y:.1f}" if one.climb == climb else f"M{x:.1f} {y:.1f}h.01"
-        climb = one.climb
+            line += f"L{x:.1f} {y:.1f}" if figures.climb == climb else f"M{x:.1f} {y:.1f}h.01"
+        climb = figures.climb
     form = ".1f" if kind == "log_likelihood" else ".3g"
-    said = [format(high, form), format(low, form)] if points else ["", ""]
+    labels = [format(high, form), format(low, form)] if points else ["", ""]
     return element(
         "g",
         element("rect", x=_LEFT, y=top, width=width, height=_PANEL, fill="none", class_="frame"),
-        element("text", said[0], x=_LEFT - 6.0, y=top + 11.0, text_anchor="end", class_="label high"),
-        element("text", said[1], x=_LEFT - 6.0, y=top + _PANEL, text_anchor="end", class_="label low"),
+        element("text", labels[0], x=_LEFT - 6.0, y=top + 11.0, text_anchor="end", class_="label high"),
+        element("text", labels[1], x=_LEFT - 6.0, y=top + _PANEL, text_anchor="end", class_="label low"),
         element("text", words, x=_LEFT + 8.0, y=top + 14.0, class_="label strong"),
         element("path", d=line, fill="none", class_="line-climb"),
         element("path", d=dots, fill="none", class_="line-fitted"),

@@ -25,14 +25,14 @@ def draw_correlation(names: Sequence[str], covariance: Sequence[Sequence[float]]
     if known.size < 2:
         return None
     spread = np.sqrt(np.diag(matrix)[known])
-    found = matrix[np.ix_(known, known)] / np.outer(spread, spread)
+    correlation = matrix[np.ix_(known, known)] / np.outer(spread, spread)
     n = known.size
     parts: list[Markup] = []
     for i in range(n):
         y = _CELL * i + 8.0
         parts.append(element("text", names[known[i]], x=_LEFT - 8.0, y=y + 23.0, text_anchor="end", class_="label"))
         for k in range(i + 1):
-            value = float(found[i, k])
+            value = float(correlation[i, k])
             x = _LEFT + _CELL * k
             kind = "positive" if value > 0 else "negative"
             parts.append(

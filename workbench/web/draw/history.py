@@ -37,7 +37,7 @@ def draw_history(
     kinds = Counter((row["model"], row["estimator"]) for row in usable)
     if not kinds:
         return None
-    kind = max(kinds, key=lambda one: (kinds[one], one))
+    kind = max(kinds, key=lambda pair: (kinds[pair], pair))
     shown = [row for row in usable if (row["model"], row["estimator"]) == kind]
     names = [name for name in HULL_PARAMETERS if any(row["parameter"] == name for row in shown)]
     times = [row["start_utc_ns"] for row in shown]
@@ -51,12 +51,12 @@ def draw_history(
         own, top = [row for row in shown if row["parameter"] == name], k * (_PANEL + _GAP) + 16.0
         bands, words = _bands(changes, name, top, first, last)
         parts += [*bands, *_panel(name, own, top, first, max(last, first + 1)), *words]
-    for one in noted:
-        if one.event_utc_ns is not None and first <= one.event_utc_ns <= last:
-            x = _x(one.event_utc_ns, first, last)
+    for note in noted:
+        if note.event_utc_ns is not None and first <= note.event_utc_ns <= last:
+            x = _x(note.event_utc_ns, first, last)
             line = element("line", x1=x, x2=x, y1=16.0, y2=bottom - 4.0, class_="noted")
-            word = element("text", f"note {one.number}", x=x, y=bottom + 5.0, text_anchor="middle", class_="label")
-            parts.append(element("g", element("title", one.text), line, word))
+            word = element("text", f"note {note.number}", x=x, y=bottom + 5.0, text_anchor="middle", class_="label")
+            parts.append(element("g", element("title", note.text), line, word))
     starts = sorted({row["start"][:10]: row["start_utc_ns"] for row in shown}.items())
     for word, at in (starts[0], starts[-1]) if len(starts) > 1 else starts:
         anchor = "start" if at == first else "end"
@@ -76,15 +76,15 @@ def _bands(
     bands: list[Markup] = []
     words: list[str] = []
     for change in changes:
-        at = [_x(instant(one), first, last) for one in change["between"]]
+        at = [_x(instant(end), first, last) for end in change["between"]]
         own = change["parameters"].get(name)
         moved = own is not None and own["moved"]
         room = {"x": at[0], "width": max(at[1] - at[0], 1.0), "y": top, "height": _PANEL}
         bands.append(element("rect", **room, class_="changed moved" if moved else "changed"))
         if moved:
             a_year = " a year" if change["kind"] == "drift" else ""
-            said = f"{change['kind']} {own['percent']:+.1f} ± {own['percent_std']:.1f} %{a_year}"
-            words.append(said)
+            text = f"{change['kind']} {own['percent']:+.1f} ± {own['percent_std']:.1f} %{a_year}"
+            words.append(text)
     if words:
         at_end = {"x": _WIDTH - 4.0, "y": top - 5.0, "text_anchor": "end", "class_": "label strong"}
         return bands, [element("text", "; ".join(words), **at_end)]

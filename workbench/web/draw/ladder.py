@@ -31,12 +31,12 @@ def draw_ladder(rungs: Sequence[Mapping[str, Any]]) -> Markup | None:
     ahead = [rung.get("one_leg_ahead") or {} for rung in rungs]
     errors = [
         {
-            sample: [e for e in (one.get(f"{sample}_percent") or {}).values() if e is not None and isfinite(e)]
+            sample: [e for e in (figures.get(f"{sample}_percent") or {}).values() if e is not None and isfinite(e)]
             for sample, _, _ in _SAMPLES
         }
-        for one in ahead
+        for figures in ahead
     ]
-    every = [e for one in errors for group in one.values() for e in group]
+    every = [e for by_sample in errors for group in by_sample.values() for e in group]
     if not every:
         return None
     most = 1.05 * max(every)
@@ -47,15 +47,15 @@ def draw_ladder(rungs: Sequence[Mapping[str, Any]]) -> Markup | None:
         parts.append(element("line", x1=x, x2=x, y1=24.0, y2=height - 30.0, class_="grid"))
         parts.append(element("text", f"{tick:g}", x=x, y=height - 16.0, text_anchor="middle", class_="label"))
     parts.append(element("text", "error one leg ahead, % of the motion", x=_LEFT, y=height - 3.0, class_="label"))
-    for k, (rung, found) in enumerate(zip(rungs, errors, strict=True)):
+    for k, (rung, by_sample) in enumerate(zip(rungs, errors, strict=True)):
         y = 24.0 + _ROW * (k + 0.5)
         name = "plain model" if rung["added"] is None else f"+ {rung['added']}"
         parts.append(element("text", name, x=_LEFT - 10.0, y=y + 4.0, text_anchor="end", class_="label strong"))
         for place, (sample, words, form) in enumerate(_SAMPLES):
-            for error in found[sample]:
+            for error in by_sample[sample]:
                 parts.append(_mark(form, _x(error, most), y + 12.0 * (place - 1), f"{words}: {error:.3g} %"))
-            if found[sample]:
-                mean = sum(found[sample]) / len(found[sample])
+            if by_sample[sample]:
+                mean = sum(by_sample[sample]) / len(by_sample[sample])
                 x = _x(mean, most)
                 parts.append(
                     element(

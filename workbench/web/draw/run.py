@@ -85,10 +85,10 @@ def draw_panels(
         What the figure is called when it is read aloud.
     """
     panels = []
-    for name, unit, said, factor in _SHOWN:
+    for name, unit, label, factor in _SHOWN:
         column = f"{name}_{unit}"
-        lines = [(factor * one[column], kind) for one, kind in tried]
-        panels.append((said, [(factor * measured[column], "measured"), *lines]))
+        lines = [(factor * prediction[column], kind) for prediction, kind in tried]
+        panels.append((label, [(factor * measured[column], "measured"), *lines]))
     return _figure(time_s, measured["rudder_angle_rad"], panels, words)
 
 

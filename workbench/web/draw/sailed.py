@@ -36,7 +36,7 @@ def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]
     (column, factor), (row, scale), across, up = _AXES[manoeuvre["kind"]]
 
     def points(curve: Sequence[Sequence[float]], of: int = row) -> Points:
-        return [(factor * one[column], scale * one[of]) for one in curve]
+        return [(factor * point[column], scale * point[of]) for point in curve]
 
     first = curves["estimates"][0]
     rudder = points(first, _RUDDER_COLUMN) if manoeuvre["kind"] == "zigzag" else []
@@ -54,11 +54,11 @@ def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]
             left, right, height = left - room, right + room, 1.2 * _WIDTH
     frame = Frame(_WIDTH, height, (left, right), (low, high))
     parts = frame.grid(across, up)
-    parts += [frame.line([p for p in points(one) if left <= p[0] <= right], "line-ship") for one in curves["ships"]]
+    parts += [frame.line([p for p in points(curve) if left <= p[0] <= right], "line-ship") for curve in curves["ships"]]
     if rudder:
         parts.append(frame.line(rudder, "line-rudder"))
-    for place, one in enumerate(curves["estimates"]):
-        shown = [p for p in points(one) if left <= p[0] <= right]
+    for place, curve in enumerate(curves["estimates"]):
+        shown = [p for p in points(curve) if left <= p[0] <= right]
         parts.append(frame.line(shown, "line-other" if place else "line-predicted"))
     if low < 0.0 < high:
         zero = frame.y(0.0)

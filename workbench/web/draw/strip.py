@@ -46,7 +46,7 @@ def draw_strips(
         By manoeuvre the instants that are shaded, shape (n,).
     """
     of, (unit, factor) = UNITS[channel], _SHOWN_IN[channel]
-    left = {name: factor * (one[f"{channel}_{of}"] - one[f"{channel}_predicted_{of}"]) for name, one in columns.items()}
+    left = {name: factor * (run[f"{channel}_{of}"] - run[f"{channel}_predicted_{of}"]) for name, run in columns.items()}
     known = [np.abs(values[np.isfinite(values)]) for values in left.values()]
     reach = float(max((np.max(values) for values in known if values.size), default=0.0))
     if not reach > 0.0:
@@ -81,6 +81,6 @@ def _extremes(values: Float) -> NDArray[np.intp]:
     if known.size <= _POINTS:
         return known
     parts = np.array_split(known, _POINTS // 2)
-    found = [sorted((part[np.argmin(values[part])], part[np.argmax(values[part])])) for part in parts]
-    result: NDArray[np.intp] = np.unique(np.concatenate(found))
+    pairs = [sorted((part[np.argmin(values[part])], part[np.argmax(values[part])])) for part in parts]
+    result: NDArray[np.intp] = np.unique(np.concatenate(pairs))
     return result

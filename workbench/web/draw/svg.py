@@ -13,12 +13,12 @@ def element(name: str, *inside: Markup | str, **attributes: object) -> Markup:
     >>> element("text", "a < b", x=1, text_anchor="end")
     Markup('<text x="1" text-anchor="end">a &lt; b</text>')
     """
-    said = "".join(
+    text = "".join(
         f' {key.rstrip("_").replace("_", "-")}="{escape(_short(value))}"'
         for key, value in attributes.items()
         if value is not None
     )
-    return Markup(f"<{name}{said}>") + Markup("").join(escape(part) for part in inside) + Markup(f"</{name}>")  # noqa: S704
+    return Markup(f"<{name}{text}>") + Markup("").join(escape(part) for part in inside) + Markup(f"</{name}>")  # noqa: S704
 
 
 def drawing(width: float, height: float, title: str, *inside: Markup, role: str = "img") -> Markup:

@@ -22,14 +22,14 @@ def draw_what_if(series: Mapping[str, Any]) -> Markup:
     """
     measured = _columns(series["measured"])
     time = measured.pop("time_s")
-    tried = [_columns(one) for one in series["predicted"]]
+    tried = [_columns(prediction) for prediction in series["predicted"]]
     return draw_panels(
         time,
         measured,
-        [(one, f"try try-{k}") for k, one in enumerate(tried)],
+        [(prediction, f"try try-{k}") for k, prediction in enumerate(tried)],
         "Measured (dots) and run freely with each value of the parameter (lines)",
     )
 
 
-def _columns(given: Mapping[str, Sequence[float | None]]) -> dict[str, Float]:
-    return {name: np.array([np.nan if x is None else x for x in values]) for name, values in given.items()}
+def _columns(series: Mapping[str, Sequence[float | None]]) -> dict[str, Float]:
+    return {name: np.array([np.nan if x is None else x for x in values]) for name, values in series.items()}

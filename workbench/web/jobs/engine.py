@@ -72,10 +72,10 @@ def _work(state: Path, warehouse: Warehouse, job: Job) -> None:
         result = KINDS[job.kind].work(warehouse, state, job.arguments, progress)
         progress.write()
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
-        found = wrapped(error)
+        failure = wrapped(error)
         progress.write()
-        if found.code == "internal":
-            traceback.print_exception(found, file=sys.stderr)
-        queue.fail(job.id, found)
+        if failure.code == "internal":
+            traceback.print_exception(failure, file=sys.stderr)
+        queue.fail(job.id, failure)
     else:
         queue.finish(job.id, result)

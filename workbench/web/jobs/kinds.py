@@ -30,9 +30,9 @@ Work = Callable[[Warehouse, Path, Mapping[str, Any], Progress], dict[str, Any]]
 
 def predict(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Put a vessel's manoeuvres beside what a parameter set predicts of them, at every horizon, and keep it."""
-    vessel, name, asked = arguments["vessel"], arguments["set"], arguments["horizon"]
-    _keep_predictions(warehouse, state, vessel, name, progress, asked)
-    return {"to": f"{of_vessel(vessel)}/model?set={name}&h={asked}"}
+    vessel, name, horizon = arguments["vessel"], arguments["set"], arguments["horizon"]
+    _keep_predictions(warehouse, state, vessel, name, progress, horizon)
+    return {"to": f"{of_vessel(vessel)}/model?set={name}&h={horizon}"}
 
 
 def _keep_predictions(
@@ -79,9 +79,9 @@ def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pr
     from kempf.flows.jobs.standing_model import standing_model
 
     spec, own = standing_model(warehouse, arguments["vessel"])
-    made, _ = diagnose_vessel(warehouse, arguments["vessel"], spec, own, progress=progress)
-    _keep_those_of(warehouse, state, arguments["vessel"], made.parameter_set_id, progress)
-    return {"to": f"/diagnoses/{made.diagnosis_id}"}
+    diagnosis, _ = diagnose_vessel(warehouse, arguments["vessel"], spec, own, progress=progress)
+    _keep_those_of(warehouse, state, arguments["vessel"], diagnosis.parameter_set_id, progress)
+    return {"to": f"/diagnoses/{diagnosis.diagnosis_id}"}
 
 
 def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -92,11 +92,13 @@ def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progres
 
     name, formula = arguments["effect"], arguments["formula"]
     own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
-    made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress, shown=arguments["standing"] or None)
+    parameter_set = add_effect(
+        warehouse, arguments["vessel"], name, own, progress=progress, shown=arguments["standing"] or None
+    )
     # before and after are looked at beside each other
-    for each in (made.parameter_set_id, made.parent):
+    for each in (parameter_set.parameter_set_id, parameter_set.parent):
         _keep_those_of(warehouse, state, arguments["vessel"], each, progress)
-    return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": made.parameter_set_id}
+    return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": parameter_set.parameter_set_id}
 
 
 def undo(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -122,13 +124,13 @@ def ingest(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], prog
     from kempf.flows.jobs.ingest_logs import ingest as take_in
 
     paths = paths_of(state, arguments["files"])
-    given = read_profiles(paths_of(state, arguments["profile"])) if arguments["profile"] else None
+    profiles = read_profiles(paths_of(state, arguments["profile"])) if arguments["profile"] else None
     new = bool(arguments["new_vessel"])
-    outcomes = take_in(warehouse, paths, arguments["vessel"], given, progress, new_vessel=new)
-    failed = [one.error for one in outcomes if one.error is not None]
+    outcomes = take_in(warehouse, paths, arguments["vessel"], profiles, progress, new_vessel=new)
+    failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(failed) == len(outcomes):
         raise failed[0]
-    return {"outcomes": [{**one.show(), "path": Path(one.path).name} for one in outcomes]}
+    return {"outcomes": [{**outcome.show(), "path": Path(outcome.path).name} for outcome in outcomes]}
 
 
 def preview(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -148,8 +150,8 @@ def correct(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
 def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
     from kempf.flows.jobs.correct_segments import plan_for, plan_new
 
-    given = arguments["bounds_utc_ns"]
-    bounds = (int(given[0]), int(given[1])) if given else None
+    ends = arguments["bounds_utc_ns"]
+    bounds = (int(ends[0]), int(ends[1])) if ends else None
     if bounds is not None and arguments["action"] == "add":
         return plan_new(warehouse, arguments["log"], bounds, arguments["reason"])
     return plan_for(warehouse, arguments["segment"], arguments["action"], arguments["reason"], bounds)
@@ -161,12 +163,12 @@ def sail(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     from kempf.flows.jobs.compare_predicted import measured_beside
     from kempf.workbench.web.data.sailed import curves_of, request_of
 
-    made = predict_checked(warehouse, arguments["vessel"], request_of(arguments), progress)
-    measured = measured_beside(warehouse, made, progress)
-    document = {**made.show(), "measured": [one.show() for one in measured], "figure": None}
-    asked = {name: arguments[name] for name in ("manoeuvre", "rudder", "angles", "side", "speed", "set")}
-    to = f"{of_vessel(arguments['vessel'])}/predict?{urlencode(asked)}"
-    return {"to": to, "document": document, "curves": curves_of(made.prediction)}
+    predicted = predict_checked(warehouse, arguments["vessel"], request_of(arguments), progress)
+    measured = measured_beside(warehouse, predicted, progress)
+    document = {**predicted.show(), "measured": [manoeuvre.show() for manoeuvre in measured], "figure": None}
+    fields = {name: arguments[name] for name in ("manoeuvre", "rudder", "angles", "side", "speed", "set")}
+    to = f"{of_vessel(arguments['vessel'])}/predict?{urlencode(fields)}"
+    return {"to": to, "document": document, "curves": curves_of(predicted.prediction)}
 
 
 def try_formula(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -181,9 +183,9 @@ def move(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     from kempf.flows.jobs.what_if import series_of, what_if
 
     vessel, parameter = arguments["vessel"], arguments["parameter"]
-    found = what_if(warehouse, vessel, parameter, arguments["set"], arguments["segment"] or None, progress)
+    outcome = what_if(warehouse, vessel, parameter, arguments["set"], arguments["segment"] or None, progress)
     to = f"{of_vessel(vessel)}/what-if?" + urlencode({n: arguments[n] for n in ("parameter", "set", "segment")})
-    return {"to": to, "document": found.show(), "series": series_of(found, MOST_INSTANTS)}
+    return {"to": to, "document": outcome.show(), "series": series_of(outcome, MOST_INSTANTS)}
 
 
 def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -191,18 +193,18 @@ def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     from kempf.flows.jobs.explain_stretch import explain_stretch
 
     vessel, (begin, end) = arguments["vessel"], arguments["window_utc_ns"]
-    found = explain_stretch(warehouse, vessel, begin, end, arguments["set"], progress)
-    asked = {"set": arguments["set"], "from": iso_utc(begin), "to": iso_utc(end)}
-    return {"to": f"{of_vessel(vessel)}/explain?{urlencode(asked)}", "document": found.show()}
+    stretch = explain_stretch(warehouse, vessel, begin, end, arguments["set"], progress)
+    fields = {"set": arguments["set"], "from": iso_utc(begin), "to": iso_utc(end)}
+    return {"to": f"{of_vessel(vessel)}/explain?{urlencode(fields)}", "document": stretch.show()}
 
 
 def propose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Find the zigzag to sail next; the result is what `kempf next-trial --json` prints."""
     from kempf.flows.jobs.next_trial import next_trial
 
-    vessel, asked = arguments["vessel"], {name: arguments[name] for name in ("set", "parameter")}
-    found = next_trial(warehouse, vessel, arguments["set"], arguments["parameter"] or None, progress)
-    return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(asked)}", "document": found.show()}
+    vessel, fields = arguments["vessel"], {name: arguments[name] for name in ("set", "parameter")}
+    trial = next_trial(warehouse, vessel, arguments["set"], arguments["parameter"] or None, progress)
+    return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(fields)}", "document": trial.show()}
 
 
 def examine(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -210,16 +212,16 @@ def examine(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     from kempf.warehouse import history
     from kempf.workbench.documents.changes import changes_document, examined
 
-    vessel, asked = arguments["vessel"], arguments["as_of"]
-    then = end_of(asked, "as_of") if asked else None
+    vessel, as_of = arguments["vessel"], arguments["as_of"]
+    then = end_of(as_of, "as_of") if as_of else None
     kinds = history.comparable(warehouse, vessel, then)
-    found = []
+    changes = []
     for done, kind in enumerate(kinds):
         progress(done, len(kinds), f"testing the sets of model {kind.model}, {kind.estimator}")
-        found.append(examined(kind).show())
+        changes.append(examined(kind).show())
     of = history.of_vessel(warehouse, vessel, as_of=then)
-    to = f"{of_vessel(vessel)}/changes" + (f"?{urlencode({'as_of': asked})}" if asked else "")
-    return {"to": to, "document": changes_document(vessel, of, found)}
+    to = f"{of_vessel(vessel)}/changes" + (f"?{urlencode({'as_of': as_of})}" if as_of else "")
+    return {"to": to, "document": changes_document(vessel, of, changes)}
 
 
 class Kind(NamedTuple):

@@ -271,8 +271,8 @@ def _put(file: sqlite3.Connection, name: str, kind: str, arguments: str) -> None
 def _made(file: sqlite3.Connection, name: str, columns: str) -> None:
     """Make a table; one of another version goes: what it holds costs time only."""
     file.execute(f"CREATE TEMP TABLE wanted {columns}")
-    known = "SELECT name FROM pragma_table_info(?)"
-    wanted, there = (file.execute(known, (one,)).fetchall() for one in ("wanted", name))
+    query = "SELECT name FROM pragma_table_info(?)"
+    wanted, there = (file.execute(query, (table,)).fetchall() for table in ("wanted", name))
     file.execute("DROP TABLE temp.wanted")
     if [tuple(row) for row in there] != [tuple(row) for row in wanted]:
         file.execute(f"DROP TABLE IF EXISTS {name}")
@@ -280,9 +280,13 @@ def _made(file: sqlite3.Connection, name: str, columns: str) -> None:
 
 
 def _row(tick: Tick) -> tuple[Any, ...]:
-    one = tick.figures
-    figures = (None,) * 5 if one is None else (one.iteration, one.climb, one.log_likelihood, one.error, one.fitted)
-    return (tick.done, tick.total, tick.what, *figures)
+    figures = tick.figures
+    values = (
+        (None,) * 5
+        if figures is None
+        else (figures.iteration, figures.climb, figures.log_likelihood, figures.error, figures.fitted)
+    )
+    return (tick.done, tick.total, tick.what, *values)
 
 
 def _tick(row: sqlite3.Row) -> Tick:

@@ -37,8 +37,8 @@ class Answer:
         return self.job if self.job is not None and self.job.state in ACTIVE else None
 
 
-def answer(desk: Desk, kind: str, vessel: str, asked: Mapping[str, str]) -> Answer:
+def answer(desk: Desk, kind: str, vessel: str, fields: Mapping[str, str]) -> Answer:
     """Return the answer to the fields of an address; errors are those of `kempf.workbench.web.pages.job.settled`."""
-    given = {name: asked.get(name, "") for name in KINDS[kind].fields}
-    arguments, digest = settled(desk, kind, vessel, given)
+    form = {name: fields.get(name, "") for name in KINDS[kind].fields}
+    arguments, digest = settled(desk, kind, vessel, form)
     return Answer(arguments, desk.queue.known(kind, arguments, digest))

@@ -14,34 +14,34 @@ from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
+def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf history --vessel NAME --changes --json` prints, where it was made; else None."""
-    return answer(desk, "changes", vessel, asked).document
+    return answer(desk, "changes", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
+def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a vessel's changes.
 
     Parameters
     ----------
-    asked : mapping of str to str
+    fields : mapping of str to str
         ``as_of``, an instant: what was known then.
     """
-    return Page("changes.html", "Changes", content(desk, vessel, asked), ((vessel, of_vessel(vessel)),))
+    return Page("changes.html", "Changes", content(desk, vessel, fields), ((vessel, of_vessel(vessel)),))
 
 
-def content(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any]:
+def content(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any]:
     """Return a vessel's parameters over time, as known now or then, with the changes that were found."""
-    found = answer(desk, "changes", vessel, asked)
-    then = end_of(found.arguments["as_of"], "as_of") if found.arguments["as_of"] else None
+    reply = answer(desk, "changes", vessel, fields)
+    then = end_of(reply.arguments["as_of"], "as_of") if reply.arguments["as_of"] else None
     of = history.of_vessel(desk.warehouse, vessel, as_of=then)
-    kinds = [] if found.document is None else found.document["changes"]
+    kinds = [] if reply.document is None else reply.document["changes"]
     return {
         "vessel": vessel,
-        "as_of": found.arguments["as_of"],
+        "as_of": reply.arguments["as_of"],
         "nothing": of.note,
         "drawn": draw_history(of.rows(), kinds, notes.of_vessel(desk.warehouse, vessel, then)),
-        "made": found.document,
-        "tested": [one for one in kinds if one["sets"]],
-        "job": found.waiting,
+        "made": reply.document,
+        "tested": [kind for kind in kinds if kind["sets"]],
+        "job": reply.waiting,
     }

@@ -30,24 +30,24 @@ def gather(desk: Desk, a: str, b: str) -> Page:
         held = ((name, aliases.of_vessel(desk.warehouse, name)) for name in vessels.names(desk.warehouse))
         known = [(name, pointed[aliases.CURRENT]) for name, pointed in held if aliases.CURRENT in pointed]
         return Page("compare.html", "Compare", {"a": a, "b": b, "known": known, "made": None})
-    one, other = _both(desk, a, b)
-    made = compared_sets(desk.warehouse, one, other)
-    same_vessel = one.vessel == other.vessel
-    scaled = {} if same_vessel else made["nondimensional"] or {}
-    rows = _rows(made["parameters"])
+    first, second = _both(desk, a, b)
+    comparison = compared_sets(desk.warehouse, first, second)
+    same_vessel = first.vessel == second.vessel
+    scaled = {} if same_vessel else comparison["nondimensional"] or {}
+    rows = _rows(comparison["parameters"])
     content = {
-        "a": one.parameter_set_id,
-        "b": other.parameter_set_id,
+        "a": first.parameter_set_id,
+        "b": second.parameter_set_id,
         "known": [],
-        "made": made,
-        "sets": (one, other),
+        "made": comparison,
+        "sets": (first, second),
         "rows": rows,
         "scaled": _rows(scaled),
         "drawn": draw_differences(_rows(scaled) or rows),
-        "stale": said_of_sets(desk.warehouse, [one, other]),
-        "inputs": list(_inputs(one, other)),
+        "stale": said_of_sets(desk.warehouse, [first, second]),
+        "inputs": list(_inputs(first, second)),
         "same_vessel": same_vessel,
-        "runs": _runs(desk, one, other) if same_vessel else None,
+        "runs": _runs(desk, first, second) if same_vessel else None,
     }
     return Page("compare.html", "Compare", content)
 
@@ -62,7 +62,7 @@ def _both(desk: Desk, a: str, b: str) -> tuple[ParameterSet, ParameterSet]:
     return named_set(desk.warehouse, a or None), named_set(desk.warehouse, b or None)
 
 
-def _inputs(one: ParameterSet, other: ParameterSet) -> Iterator[tuple[str, Any, Any]]:
+def _inputs(first: ParameterSet, second: ParameterSet) -> Iterator[tuple[str, Any, Any]]:
     """Name every input of the two that differs."""
 
     def listed(values: Any) -> str:
@@ -81,23 +81,25 @@ def _inputs(one: ParameterSet, other: ParameterSet) -> Iterator[tuple[str, Any, 
             "code": str(origin.get("code_version"))[:12],
         }
 
-    first, second = of(one), of(other)
-    yield from ((name, first[name], second[name]) for name in first if first[name] != second[name])
+    here, there = of(first), of(second)
+    yield from ((name, here[name], there[name]) for name in here if here[name] != there[name])
 
 
-def _runs(desk: Desk, one: ParameterSet, other: ParameterSet) -> dict[str, Any]:
+def _runs(desk: Desk, first: ParameterSet, second: ParameterSet) -> dict[str, Any]:
     """Return how both predict the same manoeuvres freely, and which of the two predictions are not made yet."""
-    state = fleet_state(desk.warehouse, [one.vessel])[one.vessel]
-    names = (one.parameter_set_id, other.parameter_set_id)
-    found = {name: kept(desk.state, key_of(state, name, _HORIZON)) for name in names}
-    lacking = [name for name, made in found.items() if made is None]
+    state = fleet_state(desk.warehouse, [first.vessel])[first.vessel]
+    names = (first.parameter_set_id, second.parameter_set_id)
+    predictions = {name: kept(desk.state, key_of(state, name, _HORIZON)) for name in names}
+    lacking = [name for name, prediction in predictions.items() if prediction is None]
     if lacking:
         return {"lacking": lacking, "rows": []}
-    first, second = (
-        {run["segment_id"]: run for run in made.document["runs"]} for made in found.values() if made is not None
+    here, there = (
+        {run["segment_id"]: run for run in prediction.document["runs"]}
+        for prediction in predictions.values()
+        if prediction is not None
     )
     rows = [
-        {"first": first[name], "second": second[name], "segment_id": name, "start": first[name]["start"]}
-        for name in sorted(first.keys() & second.keys(), key=lambda name: str(first[name]["start"]))
+        {"first": here[name], "second": there[name], "segment_id": name, "start": here[name]["start"]}
+        for name in sorted(here.keys() & there.keys(), key=lambda name: str(here[name]["start"]))
     ]
     return {"lacking": [], "rows": rows}

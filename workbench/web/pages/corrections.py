@@ -11,8 +11,8 @@ from kempf.warehouse.instant import iso_utc
 def as_asked(arguments: Mapping[str, Any]) -> dict[str, str]:
     """Return the fields of the form that gives a job these arguments."""
     begin, end = (iso_utc(t) for t in arguments["bounds_utc_ns"]) if arguments["bounds_utc_ns"] else ("", "")
-    said = {name: str(arguments[name]) for name in ("action", "segment", "log", "reason")}
-    return {**said, "from": begin, "to": end}
+    fields = {name: str(arguments[name]) for name in ("action", "segment", "log", "reason")}
+    return {**fields, "from": begin, "to": end}
 
 
 def undoing(planned: Mapping[str, Any]) -> dict[str, str]:
@@ -27,7 +27,7 @@ def undoing(planned: Mapping[str, Any]) -> dict[str, str]:
     fields = {"segment": after["segment_id"], "log": "", "from": "", "to": "", "reason": f"undone: {planned['reason']}"}
     if before is None or before["excluded"]:  # it was not there, or did not count
         return {**fields, "action": "exclude"}
-    said = before["detail"].get("by_hand")
-    if said is not None and said["action"] == "correct":
+    correction = before["detail"].get("by_hand")
+    if correction is not None and correction["action"] == "correct":
         return {**fields, "action": "correct", "from": before["start"], "to": before["end"]}
     return {**fields, "action": "accept"}

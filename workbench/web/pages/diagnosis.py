@@ -20,25 +20,25 @@ def document(desk: Desk, diagnosis_id: str) -> dict[str, Any]:
     NotFound
         ``no_diagnosis``.
     """
-    one = diagnoses.find(desk.warehouse, diagnosis_id)
-    if one is None:
+    diagnosis = diagnoses.find(desk.warehouse, diagnosis_id)
+    if diagnosis is None:
         raise NotFound(
             "no_diagnosis",
             f"No diagnosis has the id {diagnosis_id[:40]!r}.",
             "A vessel's page lists her diagnoses; `kempf diagnose --vessel NAME` makes one.",
         )
-    return one.show()
+    return diagnosis.show()
 
 
 def gather(desk: Desk, diagnosis_id: str) -> Page:
     """Return the page of a diagnosis."""
-    one = document(desk, diagnosis_id)
-    ranked = sorted(one["candidates"], key=lambda c: (c["score"] is None, -(c["score"] or 0.0)))
+    diagnosis = document(desk, diagnosis_id)
+    ranked = sorted(diagnosis["candidates"], key=lambda c: (c["score"] is None, -(c["score"] or 0.0)))
     content = {
-        "one": one,
+        "one": diagnosis,
         "ranked": [c for c in ranked if c["score"] is not None],
         "untestable": [c for c in ranked if c["score"] is None],
-        "ladder": draw_ladder(one["ladder"]),
-        "standing": aliases.of_vessel(desk.warehouse, one["vessel"]).get(aliases.CURRENT, ""),
+        "ladder": draw_ladder(diagnosis["ladder"]),
+        "standing": aliases.of_vessel(desk.warehouse, diagnosis["vessel"]).get(aliases.CURRENT, ""),
     }
-    return Page("diagnosis.html", "Diagnosis", content, ((one["vessel"], of_vessel(one["vessel"])),))
+    return Page("diagnosis.html", "Diagnosis", content, ((diagnosis["vessel"], of_vessel(diagnosis["vessel"])),))

@@ -31,5 +31,7 @@ def gather_list() -> Page:
 def gather(desk: Desk, name: str) -> Page:
     """Return the page of an effect."""
     effect = get(name)
-    ships = sorted(vessel for vessel, one in diagnoses.newest(desk.warehouse).items() if name in one.effects)
+    ships = sorted(
+        vessel for vessel, diagnosis in diagnoses.newest(desk.warehouse).items() if name in diagnosis.effects
+    )
     return Page("effect.html", effect.title, {"effect": effect, "ships": ships}, (("Effects", "/effects"),))

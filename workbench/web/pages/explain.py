@@ -11,17 +11,17 @@ from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
+def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf explain --vessel NAME --from T --to T --json` prints, where it was made; else None."""
-    return answer(desk, "explain", vessel, asked).document
+    return answer(desk, "explain", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
+def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a stretch.
 
     Parameters
     ----------
-    asked : mapping of str to str
+    fields : mapping of str to str
         ``from`` and ``to``, UTC; ``set``, by default the current one.
 
     Raises
@@ -29,14 +29,14 @@ def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
     UsageError
         ``instant_unreadable``, ``window_empty``.
     """
-    found = answer(desk, "explain", vessel, asked)
-    effects = found.document["effects"] if found.document is not None else []
+    reply = answer(desk, "explain", vessel, fields)
+    effects = reply.document["effects"] if reply.document is not None else []
     content = {
         "vessel": vessel,
-        "asked": {"from": asked.get("from", ""), "to": asked.get("to", ""), "set": found.arguments["set"]},
-        "made": found.document,
-        "scored": [one for one in effects if one["score"] is not None],
-        "untestable": [one for one in effects if one["score"] is None],
-        "job": found.waiting,
+        "asked": {"from": fields.get("from", ""), "to": fields.get("to", ""), "set": reply.arguments["set"]},
+        "made": reply.document,
+        "scored": [effect for effect in effects if effect["score"] is not None],
+        "untestable": [effect for effect in effects if effect["score"] is None],
+        "job": reply.waiting,
     }
     return Page("explain.html", "Explain a stretch", content, ((vessel, of_vessel(vessel)),))

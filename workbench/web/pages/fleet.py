@@ -28,18 +28,20 @@ def document(desk: Desk) -> list[dict[str, Any]]:
 def gather(desk: Desk) -> Page:
     """Return the page of the fleet, vessels that need somebody first."""
     known = diagnoses.by_vessel(desk.warehouse)
-    said = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
+    messages = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
     last = {row["vessel"]: row for row in views.run_history(desk.warehouse).rows(named=True)}
     rows = []
     for row in document(desk):
-        message, ran = said.get(row["vessel"], {}), last.get(row["vessel"])
+        message, ran = messages.get(row["vessel"], {}), last.get(row["vessel"])
         every = known.get(row["vessel"], [])
         rows.append(
             {
                 **row,
                 "diagnosis": every[-1] if every else None,
                 "since": {effect: _since(every, effect) for effect in every[-1].effects} if every else {},
-                "failures": [f"{one['what']}: {one['error']['message']}" for one in message.get("failures", ())],
+                "failures": [
+                    f"{failure['what']}: {failure['error']['message']}" for failure in message.get("failures", ())
+                ],
                 "findings": _findings(message.get("findings", ())),
                 "ran_at": f"{ran['run_at']:%Y-%m-%d %H:%M}" if ran and ran["run_at"] else None,
                 "ran": _address_of_run(ran["flow_run"]) if ran else None,
@@ -57,17 +59,17 @@ def gather(desk: Desk) -> Page:
     return Page("fleet.html", "Fleet", content)
 
 
-def _findings(found: Sequence[dict[str, Any]]) -> list[str]:
-    return [in_words(kind, count) for kind, count in sorted(Counter(one["kind"] for one in found).items())]
+def _findings(findings: Sequence[dict[str, Any]]) -> list[str]:
+    return [in_words(kind, count) for kind, count in sorted(Counter(finding["kind"] for finding in findings).items())]
 
 
 def _since(every: Sequence[StoredDiagnosis], effect: str) -> str:
     """Return the day of the first manoeuvre from which on every diagnosis names an effect."""
     first = every[-1]
-    for one in reversed(every):
-        if effect not in one.effects:
+    for diagnosis in reversed(every):
+        if effect not in diagnosis.effects:
             break
-        first = one
+        first = diagnosis
     return iso_utc(first.start_utc_ns)[:10]
 
 

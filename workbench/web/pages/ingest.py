@@ -33,11 +33,11 @@ def ask(desk: Desk, received: Received) -> Job:
     files, profile = received.files.get("log", []), received.files.get("profile", [])
     if not files:
         raise UsageError("no_file", "No log was sent.", "Choose one or several files, then send the form again.")
-    given = read_profiles(paths_of(desk.state, profile)) if profile else None
+    profiles = read_profiles(paths_of(desk.state, profile)) if profile else None
     new = received.fields.get("new_vessel", "")
     # a slip of the hand in the name is said at once
     name, _ = settle_vessel(
-        desk.warehouse, received.fields.get("vessel", "").strip() or None, given, new_vessel=bool(new)
+        desk.warehouse, received.fields.get("vessel", "").strip() or None, profiles, new_vessel=bool(new)
     )
     arguments = {"vessel": name, "files": files, "profile": profile, "new_vessel": new}
     state = fleet_state(desk.warehouse, [name])[name]

@@ -47,10 +47,10 @@ def gather(desk: Desk, name: str) -> Page:
     job = desk.queue.get(name)
     ticks = desk.queue.ticks(name)
     # one piece of work ticks many times
-    pieces = [what for what, _ in groupby(tick.what for tick in ticks)]
+    pieces = [piece for piece, _ in groupby(tick.what for tick in ticks)]
     iterations = [(tick.what, tick.figures) for tick in ticks if tick.figures is not None]
     shown = iterations[-_MOST:]
-    figures = [one for _, one in shown]
+    figures = [iteration for _, iteration in shown]
     content = {
         **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
         **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
@@ -104,8 +104,8 @@ def _sail(desk: Desk, arguments: Arguments) -> None:
 
 
 def _name_the_set(desk: Desk, arguments: Arguments) -> None:
-    asked = arguments["set"] or None
-    arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], asked)[0].parameter_set_id
+    name = arguments["set"] or None
+    arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], name)[0].parameter_set_id
 
 
 def _formula(desk: Desk, arguments: Arguments) -> None:

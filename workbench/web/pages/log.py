@@ -27,7 +27,9 @@ def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None
     row = logs.by_prefix(desk.warehouse, log_id)
     begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
     channels = desk.channels.of(row.ingest_id)
-    found = [one for one in segments.found_in(desk.warehouse, row.vessel) if one.ingest_id == row.ingest_id]
+    manoeuvres = [
+        manoeuvre for manoeuvre in segments.found_in(desk.warehouse, row.vessel) if manoeuvre.ingest_id == row.ingest_id
+    ]
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
     hers = notes.of_vessel(desk.warehouse, row.vessel)
     shown = log_document(desk.warehouse, row)
@@ -36,14 +38,14 @@ def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
         "remarks": [note.show() for note in hers if note.subject_id == row.log_id],
-        "manoeuvres": [one.show(row.file_name) for one in found],
+        "manoeuvres": [manoeuvre.show(row.file_name) for manoeuvre in manoeuvres],
         "spans": [
-            *(span_of(one) for one in found),
+            *(span_of(manoeuvre) for manoeuvre in manoeuvres),
             *spans_of_lost(gone, row.start_utc_ns, row.end_utc_ns),
             *spans_of_notes(hers, row.end_utc_ns),
         ],
         "lost": lost_as_json(gone),
-        "track": draw_track(channels, [(one.start_utc_ns, one.end_utc_ns) for one in found]),
+        "track": draw_track(channels, [(manoeuvre.start_utc_ns, manoeuvre.end_utc_ns) for manoeuvre in manoeuvres]),
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(row.start_utc_ns), iso_utc(row.end_utc_ns)),
     }

@@ -20,17 +20,22 @@ def document(desk: Desk, set_id: str) -> dict[str, Any]:
 
 def gather(desk: Desk, set_id: str) -> Page:
     """Return the page of a parameter set."""
-    one = named_set(desk.warehouse, set_id, None)
+    parameter_set = named_set(desk.warehouse, set_id, None)
     content = {
-        "one": one.show(),
+        "one": parameter_set.show(),
         "groups": (
-            ("Parameters", one.parameters),
-            ("Noise and disturbances", one.noise),
-            ("Discrete, eq. (17)", one.discrete),
+            ("Parameters", parameter_set.parameters),
+            ("Noise and disturbances", parameter_set.noise),
+            ("Discrete, eq. (17)", parameter_set.discrete),
         ),
-        "converged": bool(one.convergence.get("converged")),
-        "standing": one.parameter_set_id in set(history.standing(desk.warehouse, one.vessel)),
-        "stale": said_of_sets(desk.warehouse, [one]),
-        "correlation": draw_correlation(one.covariance_names, one.covariance),
+        "converged": bool(parameter_set.convergence.get("converged")),
+        "standing": parameter_set.parameter_set_id in set(history.standing(desk.warehouse, parameter_set.vessel)),
+        "stale": said_of_sets(desk.warehouse, [parameter_set]),
+        "correlation": draw_correlation(parameter_set.covariance_names, parameter_set.covariance),
     }
-    return Page("parameter_set.html", one.parameter_set_id, content, ((one.vessel, of_vessel(one.vessel)),))
+    return Page(
+        "parameter_set.html",
+        parameter_set.parameter_set_id,
+        content,
+        ((parameter_set.vessel, of_vessel(parameter_set.vessel)),),
+    )

@@ -14,52 +14,58 @@ from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
+def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf predict MANOEUVRE --vessel NAME --compare --json` prints, where it was made; else None."""
-    return answer(desk, "sail", vessel, asked).document
+    return answer(desk, "sail", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
+def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a predicted manoeuvre.
 
     Parameters
     ----------
-    asked : mapping of str to str
+    fields : mapping of str to str
         Fields of `kempf.workbench.web.data.sailed.request_of`, any of them; the errors are its.
     """
-    found = answer(desk, "sail", vessel, asked)
+    reply = answer(desk, "sail", vessel, fields)
     content: dict[str, Any] = {
         "vessel": vessel,
-        "asked": found.arguments,
+        "asked": reply.arguments,
         "manoeuvres": MANOEUVRES,
-        "made": found.document,
-        "job": found.waiting,
+        "made": reply.document,
+        "job": reply.waiting,
     }
-    if found.made is not None:
-        made = found.made["document"]
+    if reply.made is not None:
+        prediction = reply.made["document"]
         content |= {
-            "drawn": draw_sailed(made["manoeuvre"], found.made["curves"]),
-            "rows": list(_rows(made)),
-            "measured": list(_measured(made)),
+            "drawn": draw_sailed(prediction["manoeuvre"], reply.made["curves"]),
+            "rows": list(_rows(prediction)),
+            "measured": list(_measured(prediction)),
         }
     return Page("predict.html", "Predict a manoeuvre", content, ((vessel, of_vessel(vessel)),))
 
 
-def _rows(made: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for name, found in made["figures"].items():
-        several = isinstance(found, list)
-        for place, one in enumerate(found if several else [found]):
-            words = in_words(name, place if several else None, made["manoeuvre"])
-            yield {"words": words, "unit": FIGURES[name][1], **one}
+def _rows(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for name, entry in prediction["figures"].items():
+        several = isinstance(entry, list)
+        for place, figure in enumerate(entry if several else [entry]):
+            words = in_words(name, place if several else None, prediction["manoeuvre"])
+            yield {"words": words, "unit": FIGURES[name][1], **figure}
 
 
-def _measured(made: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    for one in made["measured"]:
-        for figure in one["figures"]:
+def _measured(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    for manoeuvre in prediction["measured"]:
+        for figure in manoeuvre["figures"]:
             name, _, place = figure["figure"].partition(".")
-            words = in_words(name, int(place) if place else None, made["manoeuvre"])
-            yield {**figure, "words": words, "unit": FIGURES[name][1], "segment_id": one["segment_id"], **_whose(one)}
+            words = in_words(name, int(place) if place else None, prediction["manoeuvre"])
+            yield {
+                **figure,
+                "words": words,
+                "unit": FIGURES[name][1],
+                "segment_id": manoeuvre["segment_id"],
+                **_whose(manoeuvre),
+            }
 
 
-def _whose(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: one[name] for name in ("side", "sample", "why")}
+def _whose(manoeuvre: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: manoeuvre[name] for name in ("side", "sample", "why")}

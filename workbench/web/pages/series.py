@@ -51,31 +51,33 @@ def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_
     """
     row = logs.by_prefix(desk.warehouse, log_id)
     begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
-    found = desk.channels.of(row.ingest_id)
+    instruments = desk.channels.of(row.ingest_id)
     names = list(dict.fromkeys(channels.split(",")))
     if len(names) > MOST_CHANNELS:
         raise UsageError(
             "too_many_channels", f"{len(names)} channels at once; at most {MOST_CHANNELS}.", "Ask for fewer at a time."
         )
-    unknown = [name for name in names if name not in found.series]
+    unknown = [name for name in names if name not in instruments.series]
     if unknown:
         raise UsageError(
             "channel_unknown",
-            f"The log has no channel {', '.join(unknown)[:200]}; it has {', '.join(found.series)}.",
+            f"The log has no channel {', '.join(unknown)[:200]}; it has {', '.join(instruments.series)}.",
             "Choose among these.",
         )
     few = max(1, min(bins, MOST_BINS))
-    return encoded(begin, end, {name: _within(name, reduced(found.series[name], begin, end, few)) for name in names})
+    return encoded(
+        begin, end, {name: _within(name, reduced(instruments.series[name], begin, end, few)) for name in names}
+    )
 
 
-def predicted_frame(desk: Desk, segment_id: str, asked: Mapping[str, str], bins: int) -> bytes:
+def predicted_frame(desk: Desk, segment_id: str, fields: Mapping[str, str], bins: int) -> bytes:
     """Return what a kept prediction says of a manoeuvre over a window, as ``channel:predicted``.
 
     With it the lateral speed as it was measured, which no log holds (eq. (18) of the paper).
 
     Parameters
     ----------
-    asked : mapping
+    fields : mapping
         ``set``, ``h`` (horizon), ``from``, ``to``.
 
     Raises
@@ -85,13 +87,13 @@ def predicted_frame(desk: Desk, segment_id: str, asked: Mapping[str, str], bins:
     UsageError
         ``instant_unreadable``, ``window_empty``.
     """
-    one = segments.by_prefix(desk.warehouse, segment_id)
-    _, _, made = kept_of(desk.warehouse, desk.state, one.vessel, asked.get("set"), asked.get("h"))
-    if made is None or one.segment_id not in made.columns:
+    segment = segments.by_prefix(desk.warehouse, segment_id)
+    _, _, prediction = kept_of(desk.warehouse, desk.state, segment.vessel, fields.get("set"), fields.get("h"))
+    if prediction is None or segment.segment_id not in prediction.columns:
         raise NotFound("no_prediction", "This manoeuvre is not predicted.", "Predict on the model's page.")
-    row = logs.of_ingest(desk.warehouse, one.ingest_id)
-    begin, end = window(asked.get("from"), asked.get("to"), row.start_utc_ns, row.end_utc_ns)
-    few, columns = max(1, min(bins, MOST_BINS)), made.series(one.segment_id)
+    row = logs.of_ingest(desk.warehouse, segment.ingest_id)
+    begin, end = window(fields.get("from"), fields.get("to"), row.start_utc_ns, row.end_utc_ns)
+    few, columns = max(1, min(bins, MOST_BINS)), prediction.series(segment.segment_id)
     names = {LATERAL: f"{LATERAL}_{UNITS[LATERAL]}"}
     names |= {f"{name}:predicted": f"{name}_predicted_{unit}" for name, unit in UNITS.items()}
     shown = {}
@@ -108,11 +110,11 @@ def _within(name: str, shown: Shown) -> Shown:
     return replace(shown, value=within_a_turn(shown.value)) if circle else shown
 
 
-def offered(found: Instruments) -> list[dict[str, Any]]:
+def offered(instruments: Instruments) -> list[dict[str, Any]]:
     """Return the channels of a log that a chart can show, those that a page begins with first."""
-    names = [name for name in FIRST if name in found.series]
-    names += [name for name in CHANNELS if name in found.series and name not in (*FIRST, *_PLACES)]
-    return [entry(name, found.sources[name], shown=name in FIRST) for name in names]
+    names = [name for name in FIRST if name in instruments.series]
+    names += [name for name in CHANNELS if name in instruments.series and name not in (*FIRST, *_PLACES)]
+    return [entry(name, instruments.sources[name], shown=name in FIRST) for name in names]
 
 
 def entry(name: str, source: str, *, shown: bool) -> dict[str, Any]:

@@ -14,14 +14,14 @@ from kempf.warehouse.segments import Segment
 _MOST = 40
 
 
-def span_of(one: Segment) -> dict[str, Any]:
+def span_of(segment: Segment) -> dict[str, Any]:
     """Return what a chart draws of a manoeuvre: its span and its executes."""
     return {
         "kind": "manoeuvre",
-        "words": one.words + (" (excluded)" if one.excluded is not None else ""),
-        "from": iso_utc(one.start_utc_ns),
-        "to": iso_utc(one.end_utc_ns),
-        "executes": [iso_utc(t) for t in one.executes_utc_ns],
+        "words": segment.words + (" (excluded)" if segment.excluded is not None else ""),
+        "from": iso_utc(segment.start_utc_ns),
+        "to": iso_utc(segment.end_utc_ns),
+        "executes": [iso_utc(t) for t in segment.executes_utc_ns],
     }
 
 
@@ -31,25 +31,25 @@ def spans_of_lost(lost: Sequence[LostStretch], start_utc_ns: int, end_utc_ns: in
         {
             "kind": "lost",
             "words": "cannot be read",
-            "from": iso_utc(start_utc_ns if one.since_ns is None else one.since_ns),
-            "to": iso_utc(end_utc_ns if one.until_ns is None else one.until_ns),
+            "from": iso_utc(start_utc_ns if stretch.since_ns is None else stretch.since_ns),
+            "to": iso_utc(end_utc_ns if stretch.until_ns is None else stretch.until_ns),
             "executes": [],
         }
-        for one in lost
+        for stretch in lost
     ]
 
 
 def spans_of_notes(notes: Iterable[Note], end_utc_ns: int) -> list[dict[str, Any]]:
     """Return the notes that state when something happened, those of earlier too: what was done then still holds."""
-    dated = [(one.event_utc_ns, one) for one in notes if one.event_utc_ns is not None]
+    dated = [(note.event_utc_ns, note) for note in notes if note.event_utc_ns is not None]
     return [
         {
             "kind": "note",
-            "words": one.text if len(one.text) <= _MOST else f"{one.text[: _MOST - 3]}...",
+            "words": note.text if len(note.text) <= _MOST else f"{note.text[: _MOST - 3]}...",
             "from": iso_utc(at),
             "to": iso_utc(at),
             "executes": [],
         }
-        for at, one in sorted(dated, key=lambda pair: pair[0])
+        for at, note in sorted(dated, key=lambda pair: pair[0])
         if at <= end_utc_ns
     ]

@@ -35,11 +35,11 @@ def gather(desk: Desk, vessel: str) -> Page:
         "lists": _newest(
             logs=listed_logs(warehouse, vessel).documents,
             manoeuvres=listed_manoeuvres(warehouse, vessel).documents,
-            sets=[{**one, "standing": one["parameter_set_id"] in standing} for one in sets],
+            sets=[{**row, "standing": row["parameter_set_id"] in standing} for row in sets],
         ),
-        "diagnoses": [one.show() for one in diagnoses.of_vessel(warehouse, vessel)],
-        "notes": [one.show() for one in notes.of_vessel(warehouse, vessel)],
-        "current": any("current" in one["aliases"] for one in sets),
+        "diagnoses": [diagnosis.show() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
+        "notes": [note.show() for note in notes.of_vessel(warehouse, vessel)],
+        "current": any("current" in row["aliases"] for row in sets),
         "stale": said_of_vessel(warehouse, vessel),
         "history": over_time.get("drawn"),
         "tested": over_time.get("tested"),
@@ -50,7 +50,7 @@ def gather(desk: Desk, vessel: str) -> Page:
 def _newest(**lists: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     """Return of each list the entries that are shown, the newest ones, and how many there are."""
     return {
-        name: {"shown": sorted(every, key=lambda one: str(one["start"]))[-MOST:], "count": len(every)}
+        name: {"shown": sorted(every, key=lambda entry: str(entry["start"]))[-MOST:], "count": len(every)}
         for name, every in lists.items()
     }
 

@@ -14,39 +14,45 @@ from kempf.workbench.web.pages.answer import Answer, answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
+def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf what-if PARAMETER --vessel NAME --json` prints, where it was made; else None."""
-    return _asked_for(desk, vessel, asked)[1].document
+    return _asked_for(desk, vessel, fields)[1].document
 
 
-def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
+def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a parameter that is moved.
 
     Parameters
     ----------
-    asked : mapping of str to str
+    fields : mapping of str to str
         ``parameter``, ``set``, ``segment``, any of them.
     """
-    one, found = _asked_for(desk, vessel, asked)
+    parameter_set, reply = _asked_for(desk, vessel, fields)
     content: dict[str, Any] = {
         "vessel": vessel,
-        "asked": found.arguments,
-        "parameters": [p.name for p in one.parameters],
-        "segments": list(one.segment_ids),
-        "made": found.document,
-        "job": found.waiting,
+        "asked": reply.arguments,
+        "parameters": [p.name for p in parameter_set.parameters],
+        "segments": list(parameter_set.segment_ids),
+        "made": reply.document,
+        "job": reply.waiting,
     }
-    if found.made is not None:
-        made = found.made["document"]
+    if reply.made is not None:
+        outcome = reply.made["document"]
         content |= {
-            "drawn": draw_what_if(found.made["series"]),
-            "middle": min(range(len(made["tried"])), key=lambda k: abs(made["tried"][k]["value"] - made["value"])),
+            "drawn": draw_what_if(reply.made["series"]),
+            "middle": min(
+                range(len(outcome["tried"])), key=lambda k: abs(outcome["tried"][k]["value"] - outcome["value"])
+            ),
         }
     return Page("what_if.html", "What if", content, ((vessel, of_vessel(vessel)),))
 
 
-def _asked_for(desk: Desk, vessel: str, asked: Mapping[str, str]) -> tuple[ParameterSet, Answer]:
+def _asked_for(desk: Desk, vessel: str, fields: Mapping[str, str]) -> tuple[ParameterSet, Answer]:
     """Return the set that is asked for, and the answer; where no parameter is, of the set's first one."""
-    one = chosen_set(desk.warehouse, vessel, asked.get("set") or None)[0]
-    named = {**asked, "set": one.parameter_set_id, "parameter": asked.get("parameter") or one.parameters[0].name}
-    return one, answer(desk, "what_if", vessel, named)
+    parameter_set = chosen_set(desk.warehouse, vessel, fields.get("set") or None)[0]
+    named = {
+        **fields,
+        "set": parameter_set.parameter_set_id,
+        "parameter": fields.get("parameter") or parameter_set.parameters[0].name,
+    }
+    return parameter_set, answer(desk, "what_if", vessel, named)
