@@ -97,10 +97,10 @@ class Peer:
         )
 
     def _steered(self, order: Any) -> Float:
-        """Sail with a helm that ``order(t, heading)`` directs, None ends it; rows of t, u, v, r, psi, x, y."""
+        """Sail with a helm that ``order(t, heading)`` directs, None ends it; rows of t, u, v, r, psi, x, y, rudder."""
         n, state, rudder, t = self.revolutions_per_s, np.zeros(6), 0.0, 0.0
         state[0] = self.speed_m_s
-        rows = [np.concatenate([[t], state])]
+        rows = [np.concatenate([[t], state, [rudder]])]
         while t < _LONGEST_S:
             wanted = order(t, float(state[3]))
             if wanted is None:
@@ -113,13 +113,40 @@ class Peer:
             c = self._slope(state + 0.5 * _STEP_S * b, middle, n)
             e = self._slope(state + _STEP_S * c, after, n)
             state, rudder, t = state + _STEP_S / 6.0 * (a + 2.0 * b + 2.0 * c + e), after, t + _STEP_S
-            rows.append(np.concatenate([[t], state]))
+            rows.append(np.concatenate([[t], state, [rudder]]))
         return np.array(rows)
 
     def circle(self, rudder_rad: float) -> TurningFigures:
         """Return the figures of a turning circle, of midships; a positive rudder turns her to starboard."""
-        t, u, v, _, heading, x, y = self._steered(lambda _, psi: rudder_rad if abs(psi) < 3.0 * np.pi else None).T
+        t, u, v, _, heading, x, y, _ = self._steered(lambda _, psi: rudder_rad if abs(psi) < 3.0 * np.pi else None).T
         return turning_figures(t, x, y, heading, np.hypot(u, v), np.arctan2(-v, u), 0.0)
+
+    def zigzag(self, heading_rad: float, rudder_rad: float, side: int, until_s: float, begin_s: float = 1.0) -> Float:
+        """Return a zigzag as it goes on, at 20 Hz.
+
+        Parameters
+        ----------
+        side : int
+            1: starboard first.
+        until_s, begin_s : float
+            When the log ends, and when the first execute is; it begins at 0.
+
+        Returns
+        -------
+        ndarray, shape (n, 8)
+            Rows of t, u, v, r, psi, x, y and rudder, of midships; s, m and rad.
+        """
+        now = side
+
+        def order(t: float, psi: float) -> float | None:
+            nonlocal now
+            if now * psi >= heading_rad:
+                now = -now
+            if t >= until_s:
+                return None
+            return now * rudder_rad if t >= begin_s else 0.0
+
+        return self._steered(order)
 
     def overshoots_deg(self, heading_rad: float, rudder_rad: float, side: int, count: int = 2) -> tuple[float, ...]:
         """Return the overshoots of a zigzag beyond the nominal heading."""

@@ -121,8 +121,8 @@ def test_an_effect_is_what_the_catalogue_calls_so(name: str) -> None:
         (said(terms[target], given) if target in terms else 0.0) + b * turned
         for target, b in zip(("sway", "yaw"), lift, strict=True)
     ]
-    # the strips of the one and the nodes of the other differ where the flow changes its side
-    assert gain(name, c) == pytest.approx(stated, rel=2e-2 if name == "cross_flow_drag" else 1e-6, abs=1e-15)
+    # the strips of the one differ a little from the integral of the other
+    assert gain(name, c) == pytest.approx(stated, rel=2e-2 if name.startswith("cross_flow") else 1e-6, abs=1e-15)
 
 
 def test_effects_outside_the_catalogue_are_their_equations() -> None:

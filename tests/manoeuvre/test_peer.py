@@ -2,6 +2,7 @@
 
 from math import radians
 
+import numpy as np
 import pytest
 
 from benchmarks.baselines.mmg_standard import Peer
@@ -31,6 +32,27 @@ def test_overshoots_are_larger_with_less_rudder_for_the_heading(peer: Peer) -> N
     assert len(few) == 2
     assert many[0] > few[0] > 3.0
     assert few[1] > few[0]
+
+
+def test_a_zigzag_goes_over_at_its_heading(peer: Peer) -> None:
+    rows = peer.zigzag(radians(10.0), radians(20.0), -1, 60.0)
+    time, heading, rudder = rows[:, 0], rows[:, 4], rows[:, 7]
+    assert (time[0], time[-1]) == (0.0, pytest.approx(60.0, abs=0.06))
+    assert np.all(rudder[time < 1.0] == 0.0) and np.min(rudder) == pytest.approx(-radians(20.0))
+    over = np.flatnonzero(np.diff(np.sign(np.diff(rudder))) > 0)
+    assert over.size and heading[np.argmin(heading)] < -radians(10.0)
+    # the rudder leaves port where the heading has come to 10 deg
+    leaves = int(np.flatnonzero(np.diff(rudder) > 0.0)[0])
+    assert heading[leaves] == pytest.approx(-radians(10.0), abs=radians(0.1))
+    overshoot = np.rad2deg(-np.min(heading)) - 10.0
+    assert overshoot == pytest.approx(peer.overshoots_deg(radians(10.0), radians(20.0), -1)[0], abs=0.05)
+
+
+def test_cubic_coefficients_of_captive_tests_are_nearly_those_of_strips() -> None:
+    # what the comment in cross_flow_cubic.yaml says: v^3 and v r^2 / 4 in sway, v^2 r / 4 and r^3 / 80 in yaw
+    sway, yaw = peers.data()["mmg"]["sway"], peers.data()["mmg"]["yaw"]
+    assert sway["vrr"] / sway["vvv"] == pytest.approx(1.0 / 4.0, rel=0.03)
+    assert yaw["rrr"] / yaw["vvr"] == pytest.approx((1.0 / 80.0) / (1.0 / 4.0), rel=0.12)
 
 
 def test_every_figure_of_a_peer_has_a_source_and_says_how_it_was_read() -> None:

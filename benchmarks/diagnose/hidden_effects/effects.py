@@ -113,6 +113,12 @@ _HULL = (
         "1",
         only(plant.CROSS_FLOW, 1.0, "1/L"),
     ),
+    HiddenEffect(
+        "cross_flow_cubic",
+        "v' -= (c/L) mean(u^3) / V,  r' -= (16 c/L^3) mean(x u^3) / V,  u = v + x r, means over -L/2 < x < L/2",
+        "1",
+        only(plant.CROSS_FLOW_CUBIC, 1.0, "1/L"),
+    ),
     HiddenEffect("sway_quadratic", "v' -= c v|v| / L", "1", only(plant.SWAY_QUAD, -1.0, "1/L")),
     HiddenEffect("yaw_quadratic", "r' -= c r|r|", "1", only(plant.YAW_QUAD, -1.0)),
     HiddenEffect("sway_abs_r_v", "v' -= c |r| v", "1", only(plant.SWAY_ABS_R, -1.0)),

@@ -41,8 +41,8 @@ SWAY_V2R, SWAY_VR2, YAW_V2R, YAW_VR2, SHALLOW, ROLL, LOAD, MEMORY = range(8, 16)
 STALL, STRAIGHTEN, LAG, DEAD_TIME, BACKLASH, RATE_LIMIT, NEUTRAL, ASYMMETRY, WASH, EXPONENT = range(16, 26)
 WALK_Y, WALK_N, WIND_Y, WIND_N, WAVE_PSI, WAVE_Y = range(26, 32)
 KICK, KICK_S, HYSTERESIS, HYSTERESIS_R, THRUSTER, BANK, BANK_M, LATE_LIFT, LATE_S, FOULING = range(32, 42)
-HARMONIC, DEAD_ZONE, DEAD_ZONE_V, SWAY_ABS_V, YAW_ABS_R = range(42, 47)
-N_THETA = 47
+HARMONIC, DEAD_ZONE, DEAD_ZONE_V, SWAY_ABS_V, YAW_ABS_R, CROSS_FLOW_CUBIC = range(42, 48)
+N_THETA = 48
 
 _STRIPS = 40
 _WAVE_DAMPING = 0.1
@@ -58,14 +58,15 @@ def effective_rudder(fed: float, v: float, V: float, theta: Float) -> float:
 
 
 @compiled
-def cross_flow(v: float, r: float, L: float) -> tuple[float, float]:
-    """Return the mean over the length of |u| u and of x |u| u with u = v + x r, by midpoint strips."""
+def cross_flow(v: float, r: float, L: float, power: int) -> tuple[float, float]:
+    """Return the means over the length of |u|^(power-1) u and of x times it with u = v + x r, by midpoint strips."""
     force, moment = 0.0, 0.0
     for k in range(_STRIPS):
         x = L * ((k + 0.5) / _STRIPS - 0.5)
         u = v + x * r
-        force += abs(u) * u
-        moment += x * abs(u) * u
+        drag = abs(u) ** (power - 1) * u
+        force += drag
+        moment += x * drag
     return force / _STRIPS, moment / _STRIPS
 
 
@@ -80,9 +81,13 @@ def hull_effects(state: Float, theta: Float, L: float) -> tuple[float, float]:
     dr += theta[ROLL] * V * V * state[6]
     dr += (theta[YAW_CUBIC] * r**3 + theta[YAW_V3] * v**3 + theta[YAW_V2R] * v * v * r + theta[YAW_VR2] * v * r * r) / V
     if theta[CROSS_FLOW] != 0.0:
-        force, moment = cross_flow(v, r, L)
+        force, moment = cross_flow(v, r, L, 2)
         dv -= theta[CROSS_FLOW] * force
         dr -= theta[CROSS_FLOW] * 16.0 / (L * L) * moment
+    if theta[CROSS_FLOW_CUBIC] != 0.0:
+        force, moment = cross_flow(v, r, L, 3)
+        dv -= theta[CROSS_FLOW_CUBIC] / V * force
+        dr -= theta[CROSS_FLOW_CUBIC] / V * 16.0 / (L * L) * moment
     return dv, dr
 
 
