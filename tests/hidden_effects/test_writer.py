@@ -32,7 +32,7 @@ def test_the_sample_is_balanced_and_large_enough(sample):
     assert set(effects) == {*CATALOGUE, *OUTSIDERS, "none"}
     for names in (CATALOGUE, OUTSIDERS):
         assert max(effects[n] for n in names) - min(effects[n] for n in names) <= 1
-        assert min(effects[n] for n in names) >= 6
+        assert min(effects[n] for n in names) >= 5
     for levels, of in ((HULLS, "hull"), (NOISES, "noise"), (DISTURBANCES, "disturbance"), (range(3), "strength")):
         count = Counter(getattr(case, of) for case in sample)
         assert set(count) == set(levels)
