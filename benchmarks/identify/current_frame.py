@@ -87,7 +87,8 @@ def main() -> None:
         (
             "# An earth-fixed stream of 0.3 m/s, modelled in the earth frame and as V_T",
             "",
-            f"`python -m benchmarks.identify.current_frame --seeds {' '.join(map(str, seeds))}`: errors of the estimates in",
+            f"`python -m benchmarks.identify.current_frame --seeds {' '.join(map(str, seeds))}`: errors of the "
+            "estimates in",
             "standard errors; 20-minute 20/20 zigzags of the Mariner hull from NMEA logs.",
             "",
             *table(runs),
