@@ -58,7 +58,7 @@ def differences(stored: ParameterSet, rebuilt: ParameterSet, tolerance: float = 
     """
     ours, theirs = (dict(_leaves(_content(s))) for s in (stored, rebuilt))
     sizes = _sizes(stored)
-    fields = []
+    disagreements = []
     for name in sorted(ours.keys() | theirs.keys()):
         a, b = ours.get(name, _ABSENT), theirs.get(name, _ABSENT)
         if _same_bits(a, b):
@@ -67,8 +67,8 @@ def differences(stored: ParameterSet, rebuilt: ParameterSet, tolerance: float = 
         on_path = name.partition(".")[0].partition("[")[0] in _PATH
         if tolerance > 0 and relative is not None and (on_path or relative <= tolerance):
             continue
-        fields.append(Difference(name, None if a is _ABSENT else a, None if b is _ABSENT else b, relative))
-    return fields
+        disagreements.append(Difference(name, None if a is _ABSENT else a, None if b is _ABSENT else b, relative))
+    return disagreements
 
 
 def verdict(stored: ParameterSet, rebuilt: ParameterSet, tolerance: float = 1e-9) -> tuple[Verdict, list[Difference]]:

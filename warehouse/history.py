@@ -401,21 +401,21 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
     rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
     known = {row["parameter_set_id"]: _Rests(row) for row in rows}
-    for rests in sorted(known.values(), key=lambda rests: rests.update.manoeuvres if rests.update else 0):
-        if rests.update is not None:
+    for basis in sorted(known.values(), key=lambda basis: basis.update.manoeuvres if basis.update else 0):
+        if basis.update is not None:
             # it rests on fewer manoeuvres, so that what that one rests on is known
-            rests.on(known.get(rests.update.set))
+            basis.on(known.get(basis.update.set))
     kinds: dict[tuple[str, ...], list[_Rests]] = {}
-    for rests in known.values():
-        if rests.pooled and rests.converged and not rests.superseded:
-            kinds.setdefault(rests.kind, []).append(rests)
+    for basis in known.values():
+        if basis.pooled and basis.converged and not basis.superseded:
+            kinds.setdefault(basis.kind, []).append(basis)
     for alike in kinds.values():
         # the largest first: it contains most others, so that few are compared
-        alike.sort(key=lambda rests: len(rests.segments), reverse=True)
+        alike.sort(key=lambda basis: len(basis.segments), reverse=True)
     return pl.Series(
         [
-            rests.superseded or (rests.pooled and any(other.replaces(rests) for other in kinds.get(rests.kind, ())))
-            for rests in known.values()
+            basis.superseded or (basis.pooled and any(other.replaces(basis) for other in kinds.get(basis.kind, ())))
+            for basis in known.values()
         ],
         dtype=pl.Boolean,
     )
@@ -433,8 +433,10 @@ class _Rests:
         #: Whether it goes by draughts that were noted.
         self.noted: bool = row["noted"]
         self._id: str = row["parameter_set_id"]
-        request = canonical_json({key: value for key, value in settings.items() if key not in ("segments", UPDATES)})
-        self.kind = (row["estimator"], row["model_sha256"], request)
+        settings_text = canonical_json(
+            {key: value for key, value in settings.items() if key not in ("segments", UPDATES)}
+        )
+        self.kind = (row["estimator"], row["model_sha256"], settings_text)
 
     def on(self, before: _Rests | None) -> None:
         """Rest on another one, too; None where that is lost."""

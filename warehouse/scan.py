@@ -42,8 +42,8 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     """
     import polars as pl
 
-    question = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
-    single = {column: value for column, value in question.items() if isinstance(value, str)}
+    filters = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
+    single = {column: value for column, value in filters.items() if isinstance(value, str)}
     empty = _empty(name)
     if table is None:
         lazy = empty.lazy()
@@ -53,11 +53,11 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     else:
         folder = seals.folder_of(table)
         if folder is not None:
-            seals.compare_files(folder, name, _candidates(table, question))
+            seals.compare_files(folder, name, _candidates(table, filters))
         held = {field.name for field in table.schema().fields}
         absent = {column: kind for column, kind in empty.schema.items() if column not in held}
         lazy = pl.scan_delta(table).with_columns(pl.lit(None, dtype=kind).alias(c) for c, kind in absent.items())
-    for column, value in question.items():
+    for column, value in filters.items():
         lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
     return lazy
 
@@ -119,10 +119,10 @@ def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:
     version, answers = vars(table).get(_ASKED, (None, {}))
     if version != table.version():
         version, answers = vars(table)[_ASKED] = table.version(), {}
-    question = tuple(sorted(single.items()))
-    if question not in answers:
-        answers[question] = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in question])
-    files: list[str] = answers[question]
+    key = tuple(sorted(single.items()))
+    if key not in answers:
+        answers[key] = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in key])
+    files: list[str] = answers[key]
     return files
 
 

@@ -1,8 +1,9 @@
 """Ships whose physics is known and is none of ours: zigzags of the MMG standard method, and the circles beyond them.
 
-The tank's thirteen zigzags as a model from captive tests sails them, written as the tank's logs are, through the whole
-job. Then her turning circles with 35 deg of rudder as the program predicts them beside those that she makes: what is
-tighter than anything in the logs. The first ship is the KVLCC2 as published, the others have coefficients scattered.
+Zigzags of the tank's thirteen orders as a model from captive tests sails them, 170 s each, written as the tank's logs
+are, through the whole job. Then her turning circles with 35 deg of rudder as the program predicts them beside those
+that she makes: what is tighter than anything in the logs. The first ship is the KVLCC2 as published, the others have
+coefficients scattered. An interval is that of all models that the diagnosis does not tell apart.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from kempf.warehouse.store import Warehouse
 
 _DOCS = Path(__file__).parents[2] / "docs"
 _VESSEL = "hsva_kvlcc2"
-#: rudder and heading, deg, and which side first, as in the tank; how long each goes on, s
+#: which side first, rudder and heading, deg, as in the tank; how long each goes on, s
 _RUNS = (
     *((1, rudder, heading) for rudder, heading in ((5, 1), (10, 1), (15, 1), (10, 5), (15, 5), (20, 5), (25, 5))),
     *((1, rudder, heading) for rudder, heading in ((30, 5), (35, 5), (10, 10), (20, 10))),
@@ -100,17 +101,19 @@ def _figures(warehouse: Warehouse, peer: Peer, words: str, set_id: str) -> list[
             continue
         cells = []
         for name in _FIGURES:
-            true, one = float(getattr(own, name)), figures[name]
-            assert one.value is not None and one.low is not None and one.high is not None
-            mark = "" if one.low <= true <= one.high else ", outside"
-            off = 100.0 * (one.value / true - 1.0)
-            cells.append(f"{true:.3g}: {one.value:.3g} ({one.low:.3g} to {one.high:.3g}{mark}), {off:+.0f} %")
+            true, figure = float(getattr(own, name)), figures[name]
+            if figure.value is None or figure.low is None or figure.high is None:
+                cells.append(f"{true:.3g}: not predicted")
+                continue
+            mark = "" if figure.low <= true <= figure.high else ", outside"
+            off = 100.0 * (figure.value / true - 1.0)
+            cells.append(f"{true:.3g}: {figure.value:.3g} ({figure.low:.3g} to {figure.high:.3g}{mark}), {off:+.0f} %")
         rows.append([words, side, *cells])
     return rows
 
 
 def _of(number: int, model: ModelSpec) -> list[str]:
-    """Return the part of the page of a ship: what is concluded, and circles by it and by each cross-flow drag alone."""
+    """Return the part of the page of a ship: what is concluded, and circles by it and by either law of cross-flow."""
     peer = ship(number)
     with TemporaryDirectory() as place, TemporaryDirectory() as logs:
         warehouse = Warehouse(place)
@@ -145,13 +148,15 @@ def main() -> None:
     given = parser.parse_args()
     model = read_model(_DOCS / "models" / "tank.yaml")
     lines = [
-        "Cells: her own, then predicted from her zigzags with its 95 % interval. The first model of each ship is the "
-        "one that `kempf diagnose` ends with; the others are fitted beside it.",
+        "Cells: her own, then predicted from her zigzags with its 95 % interval, which is that of all models that the "
+        "diagnosis does not tell apart. The first model of each ship is the one that `kempf diagnose` ends with; the "
+        "others are fitted beside it.",
         "",
     ]
     for number in range(given.ships):
         lines += _of(number, model)
-    result_page.write("identify.captive_twin", "Circles of ships of the MMG standard method, from zigzags", lines)
+    title, options = "Circles of ships of the MMG standard method, from zigzags", f"--ships {given.ships}"
+    result_page.write("identify.captive_twin", title, lines, options=options)
 
 
 if __name__ == "__main__":

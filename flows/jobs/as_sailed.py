@@ -91,12 +91,12 @@ def as_sailed(
     """
     zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, Zigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
-    manoeuvres, logs = [], _Logs(warehouse)
+    sailed, logs = [], _Logs(warehouse)
     for done, (segment, manoeuvre) in enumerate(pairs):
         progress(done, len(pairs), f"reading {segment.segment_id}")
-        manoeuvres.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id)))
+        sailed.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id)))
     progress(len(pairs), len(pairs), "read")
-    return manoeuvres
+    return sailed
 
 
 def _one(

@@ -195,8 +195,8 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
         except KempfError as error:
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
-    for correction in corrections.all_of(warehouse, [row.log_id for row in kept]):
-        corrections.add(scratch, correction.log_id, correction.segment_id, correction.correction)
+    for entry in corrections.all_of(warehouse, [row.log_id for row in kept]):
+        corrections.add(scratch, entry.log_id, entry.segment_id, entry.correction)
     # those that no longer stand, too: their models are brought up to date with the others
     parameter_sets.insert(scratch, parameter_sets.all_as_stored(warehouse, vessel))
     for alias, name in aliases.of_vessel(warehouse, vessel).items():

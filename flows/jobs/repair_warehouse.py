@@ -294,12 +294,14 @@ def _read_again(warehouse: Warehouse, name: str) -> str:
     profile = vessels.get(warehouse, row.profile_sha256)
     log_corrections = corrections.of_logs(warehouse, [name]).get(name, ())
     with raw.opened(warehouse, name) as log, spooled(row.file_name, log, profile) as read:
-        read_log = look_through(row.vessel, row.file_name, log, profile, read, log_corrections, codes_of(warehouse))
-        if read_log.found.examination.ingest_id != row.ingest_id:
+        looked_through = look_through(
+            row.vessel, row.file_name, log, profile, read, log_corrections, codes_of(warehouse)
+        )
+        if looked_through.found.examination.ingest_id != row.ingest_id:
             raise KempfError(
                 "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}
             )
-        search_log.store(warehouse, [read_log.found])
+        search_log.store(warehouse, [looked_through.found])
         batch = [(row, read)]
         readings.write(warehouse, batch)
         readings.write_rejected(warehouse, batch)

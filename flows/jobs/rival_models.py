@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import model_of
+from kempf.flows.jobs.standing_model import SEARCH, inputs_of, model_of
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
-from kempf.schemas.errors import KempfError
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import diagnoses, parameter_sets
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.parameter_set import ParameterSet
@@ -30,8 +31,8 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
     """Return the sets of the models that fit the data of a set as well as its own.
 
     A confusion set of the vessel's newest diagnosis names the effects that fit alike; a model with another member in an
-    effect's place is read where it is stored, and fitted to the same manoeuvres and stored where it is not. No alias
-    moves.
+    effect's place is read where it is stored, and fitted to the same manoeuvres and stored where it is not; where other
+    manoeuvres are chosen by now there is a remark in its place. No alias moves.
 
     Parameters
     ----------
@@ -82,8 +83,8 @@ def _manoeuvres(inputs: Mapping[str, Any]) -> list[str]:
 def _other_effects_alone(warehouse: Warehouse, parameter_set: ParameterSet) -> list[ParameterSet]:
     """Return the stored sets that differ from a set in the effects of their model alone, in the order of their ids.
 
-    One of another current or wind, or of other code, would count as a doubt about the effects what is another model of
-    the surroundings, or another version of the estimator.
+    With one of another current or wind, or of other code, the interval of the effects would hold what is another model
+    of the surroundings, or another version of the estimator.
     """
     names = sorted(parameter_sets.summaries(warehouse, parameter_set.vessel)["parameter_set_id"].to_list())
     every = parameter_sets.get_all(warehouse, parameter_set.vessel, names)
@@ -96,15 +97,24 @@ def _other_effects_alone(warehouse: Warehouse, parameter_set: ParameterSet) -> l
     ]
 
 
-def _beside_effects(inputs: Mapping[str, Any]) -> dict[str, Any]:
-    model = {name: value for name, value in (inputs.get("model") or {}).items() if name != "effects"}
-    return {"model": model, **{name: inputs.get(name) for name in ("estimator", "code_version")}}
+def _beside_effects(inputs: Mapping[str, Any]) -> tuple[Any, ...]:
+    # a model's name and parent change no estimate; a setting that an older set does not have is the default
+    model = ModelSpec.model_validate(inputs.get("model") or {}).model_dump(exclude={"effects", "name", "parent"})
+    search = (inputs.get("settings") or {}).get(SEARCH)
+    return model, search, inputs.get("estimator"), inputs.get("code_version")
 
 
 def _made(
     warehouse: Warehouse, parameter_set: ParameterSet, names: tuple[str, ...], progress: Progress
 ) -> ParameterSet:
     spec, own = model_of(parameter_set)
+    spec, search = spec.model_copy(update={"effects": names}), parameter_set.settings.get(SEARCH)
     chosen = choose(warehouse, parameter_set.vessel)
-    rival, _ = store_model(warehouse, chosen, spec.model_copy(update={"effects": names}), own, progress)
+    if not _same_data(inputs_of(chosen, spec, own, search).as_json(), parameter_set):
+        raise NotFound(
+            "other_manoeuvres",
+            "fitted now it would rest on other manoeuvres than the set",
+            "Diagnose the vessel again, and predict by the set that follows.",
+        )
+    rival, _ = store_model(warehouse, chosen, spec, own, progress, search=search)
     return rival

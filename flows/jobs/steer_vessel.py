@@ -107,10 +107,10 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
         )
     parameter_set, _ = chosen_set(warehouse, vessel, request.set_id)
     ship, dropped = _with_right_instruments(ship_of_set(warehouse, parameter_set, request.speed_m_s))
-    makings = [(parameter_set.parameter_set_id, ship.hull, ship.effects)]
+    designs = [(parameter_set.parameter_set_id, ship.hull, ship.effects)]
     if request.wrong is not None:
-        makings.append(_wrong(warehouse, request.wrong, ship))
-    laws = tuple(_tried(*making, ship, request) for making in makings)
+        designs.append(_wrong(warehouse, request.wrong, ship))
+    laws = tuple(_tried(*design, ship, request) for design in designs)
     warnings = [*ship.warnings, *dropped, *_not_simulated(ship, dropped)]
     needed = abs(laws[0].law.rudder_per_force * request.environment.wind_force.mean)
     if needed > 0.8 * request.settings.rudder_limit_rad:

@@ -34,6 +34,7 @@ def test_decisions_have_one_form(path: Path) -> None:
     lines = path.read_text(encoding="utf-8").splitlines()
     assert lines[0].startswith(f"# {path.name[:4]} ")
     assert [line for line in lines if line.startswith("## ")] == ["## Context", "## Decision", "## Consequences"]
+    assert not [line for line in lines if re.fullmatch(r"[A-Z]{3,}", line)], "a place that was to be filled in"
 
 
 def test_decisions_are_numbered_through() -> None:

@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 
 from kempf.flows.jobs import rival_models
+from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import diagnoses, parameter_sets
 from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.parameter_set import ParameterSet
@@ -16,9 +18,14 @@ from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import inputs, parameter_set
 
 
-def of_model(effects: tuple[str, ...], code: str = "c0de", **model: Any) -> ParameterSet:
-    spec = {"name": "linear", "current": "free", **model, "effects": effects}
-    return parameter_set(made_of=inputs(model_spec=spec, code_version=code))
+def of_model(
+    effects: tuple[str, ...], code: str = "c0de", estimator: str = "ml-pooled", search: Any = None, **model: Any
+) -> ParameterSet:
+    spec = ModelSpec(**model, effects=effects).model_dump(mode="json")
+    settings = {"search": search} if search else {}
+    return parameter_set(
+        made_of=inputs(model_spec=spec, code_version=code, estimator=estimator, settings=settings), settings=settings
+    )
 
 
 @pytest.fixture
@@ -53,7 +60,8 @@ def test_a_stored_set_with_the_other_effect_is_read(
     drag: tuple[Warehouse, ParameterSet], fitted: list[tuple[str, ...]]
 ) -> None:
     warehouse, own = drag
-    cubed = of_model(("yaw_v3",))
+    # of a file of another name, and above another parent
+    cubed = of_model(("yaw_v3",), name="from a file", parent="ps-1")
     parameter_sets.insert(warehouse, [cubed])
     found = rival_models.rivals_of(warehouse, own)
     assert [rival.parameter_set_id for rival in found.sets] == [cubed.parameter_set_id]
@@ -62,8 +70,11 @@ def test_a_stored_set_with_the_other_effect_is_read(
 
 @pytest.mark.parametrize(
     "otherwise",
-    [{"current": "none"}, {"rudder_speed_exponent": 1.0}, {"code": "0lder"}],
-    ids=["current", "rudder", "code"],
+    [
+        *({"current": "none"}, {"rudder_speed_exponent": 1.0}, {"code": "0lder"}, {"estimator": "ml"}),
+        {"search": {"starts": 3}},
+    ],
+    ids=["current", "rudder", "code", "estimator", "search"],
 )
 def test_one_that_differs_in_more_is_no_rival(
     drag: tuple[Warehouse, ParameterSet], fitted: list[tuple[str, ...]], otherwise: dict[str, Any]
@@ -73,3 +84,15 @@ def test_one_that_differs_in_more_is_no_rival(
     found = rival_models.rivals_of(warehouse, own)
     assert [rival.parameter_set_id for rival in found.sets] == ["ps-fitted"]
     assert fitted == [("yaw_v3",)]
+
+
+def test_where_other_manoeuvres_are_chosen_by_now_none_is_fitted(
+    drag: tuple[Warehouse, ParameterSet], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    warehouse, own = drag
+    profile = own.provenance["inputs"]["profile_sha256"]
+    nothing = Chosen(own.vessel, profile, "c0de", (), {}, {}, {})
+    monkeypatch.setattr(rival_models, "choose", lambda *_: nothing)
+    found = rival_models.rivals_of(warehouse, own)
+    assert not found.sets and "would rest on other manoeuvres" in found.remarks[0]
+    assert found.remarks[0].startswith("yaw_v3 fits as well and is not among the models")

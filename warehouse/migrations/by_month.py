@@ -165,7 +165,7 @@ def _held(warehouse: Warehouse, name: str, version: int) -> list[Held]:
     rows = files.group_by(key, ingest).agg(pl.col("num_records").sum()).rows()
     months = _months(warehouse, {str(row[1]) for row in rows})
     ingests = [Held(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows]
-    return sorted(ingests, key=lambda held: (held.vessel_key, held.month, held.ingest_id))
+    return sorted(ingests, key=lambda ingest: (ingest.vessel_key, ingest.month, ingest.ingest_id))
 
 
 def _months(warehouse: Warehouse, ingests: set[str]) -> dict[str, str]:

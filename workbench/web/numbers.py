@@ -41,8 +41,8 @@ def whole_number(text: str) -> int | None:
 
     Examples
     --------
-    >>> whole_number("12"), whole_number("-1"), whole_number("²"), whole_number("")
-    (12, None, None, None)
+    >>> whole_number("12"), whole_number("-1"), whole_number("²"), whole_number(""), whole_number("9" * 10)
+    (12, None, None, None, None)
     """
     # `isdigit` takes a superscript too, which `int` does not read
     return int(text) if text.isdecimal() and len(text) < 10 else None

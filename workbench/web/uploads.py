@@ -95,11 +95,14 @@ class Uploads:
         file.file.seek(0)
         to = self.folder / digest.hexdigest() / base_name(file.filename or "")
         to.parent.mkdir(parents=True, exist_ok=True)
-        # the same file may be arriving twice
-        part = to.with_name(f"{to.name[:180]}.{uuid4().hex}.part")
-        with part.open("wb") as target:
-            shutil.copyfileobj(file.file, target, _BLOCK)
-        part.replace(to)
+        # a name of its own, since the same file may be arriving twice
+        part = to.with_name(f"{uuid4().hex}.part")
+        try:
+            with part.open("wb") as target:
+                shutil.copyfileobj(file.file, target, _BLOCK)
+            part.replace(to)
+        finally:
+            part.unlink(missing_ok=True)
         return f"{to.parent.name}/{to.name}"
 
     def _forget_the_oldest(self) -> None:

@@ -34,14 +34,14 @@ class KeptChannels:
             if ingest_id in self._held:
                 self._held.move_to_end(ingest_id)
                 return self._held[ingest_id]
-        channels = channels_of(self._warehouse, ingest_id)
+        instruments = channels_of(self._warehouse, ingest_id)
         with self._lock:
-            self._held[ingest_id] = channels
+            self._held[ingest_id] = instruments
             self._held.move_to_end(ingest_id)
             while len(self._held) > 1 and sum(map(_bytes, self._held.values())) > self._most:
                 self._held.popitem(last=False)
-        return channels
+        return instruments
 
 
-def _bytes(channels: Instruments) -> int:
-    return sum(series.time_utc_ns.nbytes + series.value.nbytes for series in channels.series.values())
+def _bytes(instruments: Instruments) -> int:
+    return sum(series.time_utc_ns.nbytes + series.value.nbytes for series in instruments.series.values())
