@@ -173,5 +173,5 @@ def test_the_schedule_starts_runs_by_itself(deployed: dict[str, str], place: War
         def fired() -> list[Any]:
             return [r for r in flow_runs("COMPLETED") if r.id not in before and r.auto_scheduled]
 
-        wait_for(fired, 300.0, every_s=0.5)
+        wait_for(fired, 600.0, every_s=0.5)
         client.delete_deployment_schedule(deployment.id, made.id)
