@@ -144,7 +144,7 @@ def _of(number: int, model: ModelSpec) -> list[str]:
 def main() -> None:
     """Sail and judge the ships, and write ``results/captive_twin.md``."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--ships", type=int, default=4)
+    parser.add_argument("--ships", type=int, default=2)
     given = parser.parse_args()
     model = read_model(_DOCS / "models" / "tank.yaml")
     lines = [
