@@ -6,7 +6,7 @@ Science and Technology 20, doi 10.1007/s00773-014-0293-y. It shares no code with
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -136,13 +136,21 @@ class Peer:
         ndarray, shape (n, 8)
             Rows of t, u, v, r, psi, x, y and rudder, of midships; s, m and rad.
         """
-        now = side
+        return self._zigzag(heading_rad, rudder_rad, side, lambda t, _: t >= until_s, begin_s)
+
+    def _zigzag(
+        self, heading_rad: float, rudder_rad: float, side: int, over: Callable[[float, int], bool], begin_s: float = 0.0
+    ) -> Float:
+        """Sail a zigzag until it is over, by time and by how often the rudder was reversed."""
+        turns = 0
 
         def order(t: float, psi: float) -> float | None:
-            nonlocal now
+            nonlocal turns
+            now = side if turns % 2 == 0 else -side
             if now * psi >= heading_rad:
+                turns += 1
                 now = -now
-            if t >= until_s:
+            if over(t, turns):
                 return None
             return now * rudder_rad if t >= begin_s else 0.0
 
@@ -150,17 +158,7 @@ class Peer:
 
     def overshoots_deg(self, heading_rad: float, rudder_rad: float, side: int, count: int = 2) -> tuple[float, ...]:
         """Return the overshoots of a zigzag beyond the nominal heading."""
-        turns = 0
-
-        def order(_: float, psi: float) -> float | None:
-            nonlocal turns
-            now = side if turns % 2 == 0 else -side
-            if now * psi >= heading_rad:
-                turns += 1
-                now = -now
-            return None if turns > count else now * rudder_rad
-
-        psi = self._steered(order)[:, 4]
+        psi = self._zigzag(heading_rad, rudder_rad, side, lambda _, turns: turns > count)[:, 4]
         found, to, start = [], side, 0
         for _ in range(count):
             there = start + int(np.argmax(to * psi[start:] >= heading_rad))

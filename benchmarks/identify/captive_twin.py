@@ -29,7 +29,6 @@ from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets
 from kempf.warehouse.store import Warehouse
 
 _DOCS = Path(__file__).parents[2] / "docs"
@@ -126,7 +125,7 @@ def _of(number: int, model: ModelSpec) -> list[str]:
         for effects in (added, *alone):
             spec = model.model_copy(update={"effects": effects})
             fitted, _ = store_model(warehouse, choose(warehouse, _VESSEL), spec, NONE_OF_ONES_OWN)
-            point(warehouse, parameter_sets.get(warehouse, fitted.parameter_set_id))
+            point(warehouse, fitted)
             rows += _figures(warehouse, peer, " + ".join(effects) or "plain", fitted.parameter_set_id)
     misfit = [step["one_leg_ahead"]["held_out_misfit"] for step in (shown["ladder"][0], shown["ladder"][-1])]
     sets = "; ".join(" or ".join(chosen["effects"]) for chosen in shown["sets"]) or "none"

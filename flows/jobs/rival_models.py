@@ -70,8 +70,13 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
     return Rivals(tuple(sets), tuple(remarks))
 
 
+def _inputs(parameter_set: ParameterSet) -> Mapping[str, Any]:
+    inputs: Mapping[str, Any] = parameter_set.provenance.get("inputs") or {}
+    return inputs
+
+
 def _same_data(inputs: Mapping[str, Any], parameter_set: ParameterSet) -> bool:
-    own: Mapping[str, Any] = parameter_set.provenance.get("inputs") or {}
+    own = _inputs(parameter_set)
     return _manoeuvres(inputs) == _manoeuvres(own) and inputs.get("profile_sha256") == own.get("profile_sha256")
 
 
@@ -88,12 +93,9 @@ def _other_effects_alone(warehouse: Warehouse, parameter_set: ParameterSet) -> l
     """
     names = sorted(parameter_sets.summaries(warehouse, parameter_set.vessel)["parameter_set_id"].to_list())
     every = parameter_sets.get_all(warehouse, parameter_set.vessel, names)
-    own: Mapping[str, Any] = parameter_set.provenance.get("inputs") or {}
+    own = _beside_effects(_inputs(parameter_set))
     return [
-        other
-        for other in every
-        if _same_data(other.provenance.get("inputs") or {}, parameter_set)
-        and _beside_effects(other.provenance.get("inputs") or {}) == _beside_effects(own)
+        other for other in every if _same_data(_inputs(other), parameter_set) and _beside_effects(_inputs(other)) == own
     ]
 
 
