@@ -1,7 +1,8 @@
 """Which code made a result: fingerprints of its source, the packages it rests on, the commit where there is one.
 
 A result goes through stages: readings of a log, what is found in them, parameters, diagnoses. Each stage has a
-fingerprint of its own, so that a change of one makes anew only what rests on it, and a comment nothing.
+fingerprint of its own, so that a change of one makes anew only what rests on it, and a comment nothing. A better
+sentence about an effect makes diagnoses anew, which hold such sentences, and no parameter set.
 """
 
 from __future__ import annotations
@@ -31,13 +32,17 @@ Stage = Literal["ingest", "segment", "estimate", "diagnose"]
 class Entry:
     """Where the code of a stage begins."""
 
-    #: What its jobs call, in ``kempf.pipeline``; all that these import counts with them. The catalogue of effects does
-    #: not: which effects a set has, and which a diagnosis tries, stands with their hashes among the inputs of these.
+    #: What its jobs call, in ``kempf.pipeline``; all that these import counts with them.
     modules: tuple[str, ...]
     #: Stages whose results its own are made of, and whose code therefore counts, too. The bounds of a segment are named
     #: among the inputs of a parameter set, so that the code that finds segments does not count in it.
     rests_on: tuple[Stage, ...] = ()
+    #: Keys of an effect's file that no result of the stage holds.
+    left_out: tuple[str, ...] = ()
 
+
+#: What an effect's file says beside what it computes: what only `kempf effects` shows, and what a diagnosis says, too.
+_SHOWN, _SAID = ("equation", "reference", "meaning", "confounded_with"), ("title", "plain", "separated_by")
 
 STAGES: dict[Stage, Entry] = {
     "ingest": Entry(("ingest.read",)),
@@ -60,8 +65,11 @@ STAGES: dict[Stage, Entry] = {
             *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.unsure_instants"),
         ),
         ("ingest",),
+        _SHOWN + _SAID,
     ),
-    "diagnose": Entry(("diagnose.diagnosis", "diagnose.diagnosis_json", "diagnose.evidence"), ("segment", "estimate")),
+    "diagnose": Entry(
+        ("diagnose.diagnosis", "diagnose.diagnosis_json", "diagnose.evidence"), ("segment", "estimate"), _SHOWN
+    ),
 }
 #: Rooms that a result is a function of.
 _ROOMS = ("pipeline", "schemas")
@@ -107,7 +115,7 @@ def modules_in(folder: Path, stage: Stage) -> dict[str, str]:
     ModuleNotFoundError
         A module that the stage begins with is not there.
     """
-    return SourceTree(folder, _ROOMS).reached(_entries(stage))
+    return SourceTree(folder, _ROOMS).reached(_entries(stage), STAGES[stage].left_out)
 
 
 def _entries(stage: Stage) -> list[str]:

@@ -1,8 +1,10 @@
 """Fingerprints of source code: what its modules do, whatever their comments and docstrings say.
 
 Nothing is imported. A module counts by its syntax tree, without docstrings, in a form that is the same for every
-version of Python. Which modules it imports is read from the same tree. Parsing takes a second for the whole source, so
-what was found in a file is kept by the hash of its bytes beside Python's own byte code, or in the user's cache folder.
+version of Python. Which modules it imports is read from the same tree. A YAML file counts by what it says, without
+comments and without the keys that the caller leaves out; any other file counts by its bytes. Parsing takes a second for
+the whole source, so what was found in a file is kept by the hash of its bytes beside Python's own byte code, or in the
+user's cache folder.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ import ast
 import json
 import os
 import secrets
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
@@ -19,12 +21,14 @@ from importlib.util import cache_from_source, resolve_name
 from pathlib import Path
 from typing import Any
 
+from kempf.schemas import yaml_text
+
 #: Name of the package, and the part of it that makes logs: a log counts by its own bytes.
 _PACKAGE, _SIMULATOR = "kempf", "pipeline.simulate"
 #: A module that imports one of these opens files beside it by name: all that lie in its folder count with it.
 _BY_NAME = ("importlib", "pkgutil")
 #: Of what is kept: the way in which a tree is written down, and how many files of which no more is asked may stay.
-_FORM, _MOST_KEPT = 1, 4000
+_FORM, _MOST_KEPT = 2, 4000
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,26 @@ def read_module(content: bytes) -> Module:
     names = tuple(sorted(set(_imported(tree))))
     by_name = any(name.partition(".")[0] in _BY_NAME for name in names)
     return Module(sha256(repr(_plain(tree)).encode()).hexdigest(), names, by_name)
+
+
+def read_yaml(content: bytes, left_out: Collection[str] = ()) -> str:
+    """Return the digest of what a YAML file says; of its bytes where it is not valid YAML.
+
+    Parameters
+    ----------
+    left_out : collection of str
+        Keys that do not count, however deep they stand.
+    """
+    with suppress(yaml_text.NotYaml, TypeError):  # keys of different types are not sorted
+        said = _without(yaml_text.load(content), left_out)
+        content = json.dumps(said, sort_keys=True, default=repr).encode()
+    return sha256(content).hexdigest()
+
+
+def _without(value: Any, left_out: Collection[str]) -> Any:
+    if isinstance(value, dict):
+        return {key: _without(entry, left_out) for key, entry in value.items() if key not in left_out}
+    return [_without(entry, left_out) for entry in value] if isinstance(value, list) else value
 
 
 def _plain(node: Any) -> Any:
@@ -106,13 +130,15 @@ class SourceTree:
         """Dotted names of all modules, sorted."""
         return tuple(sorted(self._files))
 
-    def reached(self, entries: Iterable[str]) -> dict[str, str]:
+    def reached(self, entries: Iterable[str], left_out: Collection[str] = ()) -> dict[str, str]:
         """Return the digests of some modules, of all that they import, and of the files that they open by name.
 
         Parameters
         ----------
         entries : iterable of str
             Dotted names.
+        left_out : collection of str
+            Keys of YAML files that do not count.
 
         Returns
         -------
@@ -142,7 +168,7 @@ class SourceTree:
                 beside = [p for p in sorted(path.parent.rglob("*")) if p.is_file() and p.parent.name != "__pycache__"]
                 todo += [_name(p, self._folder) for p in beside if p.suffix == ".py"]
                 data = [p for p in beside if p.suffix != ".py"]
-                digests |= {p.relative_to(self._folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in data}
+                digests |= {p.relative_to(self._folder).as_posix(): self._known.data(p, left_out) for p in data}
         self._known.keep()
         return digests
 
@@ -153,33 +179,45 @@ def _name(path: Path, folder: Path) -> str:
 
 
 class _Kept:
-    """What was found in files of source before, by the hash of their bytes."""
+    """What was found in files before, by the hash of their bytes; for YAML with the keys that were left out."""
 
     def __init__(self) -> None:
-        self._modules: dict[str, list[Any]] = {}
-        self._new: dict[str, list[Any]] = {}
+        self._files: dict[str, Any] = {}
+        self._new: dict[str, Any] = {}
         for place in _places():
             with suppress(OSError, ValueError, KeyError, TypeError):
                 content = json.loads(place.read_text(encoding="utf-8"))
                 if content["form"] == _FORM:
-                    self._modules |= content["modules"]
+                    self._files |= content["files"]
 
     def module(self, content: bytes) -> Module:
         """Return what a file of source does; it is parsed where that is not known."""
         key = sha256(content).hexdigest()
         with suppress(KeyError, ValueError, TypeError):
-            digest, imports, by_name = self._modules[key]
+            digest, imports, by_name = self._files[key]
             return Module(str(digest), tuple(imports), bool(by_name))
         module = read_module(content)
         self._new[key] = [module.digest, module.imports, module.by_name]
         return module
 
+    def data(self, path: Path, left_out: Collection[str]) -> str:
+        """Return the digest of a file that is no source; a YAML file is parsed where it is not known."""
+        content = path.read_bytes()
+        digest = sha256(content).hexdigest()
+        if path.suffix != ".yaml":
+            return digest
+        key = " ".join((digest, *sorted(left_out)))
+        known = self._files.get(key)
+        if not isinstance(known, str):
+            known = self._new[key] = read_yaml(content, left_out)
+        return known
+
     def keep(self) -> None:
         """Write down what is new, at the first place that can be written to; nowhere is no harm."""
         if not self._new:
             return
-        modules = {**self._modules, **self._new} if len(self._modules) < _MOST_KEPT else self._new
-        text = json.dumps({"form": _FORM, "modules": modules}, separators=(",", ":"))
+        files = {**self._files, **self._new} if len(self._files) < _MOST_KEPT else self._new
+        text = json.dumps({"form": _FORM, "files": files}, separators=(",", ":"))
         for place in _places():
             passing = place.with_name(f"{place.name}.{secrets.token_hex(8)}")
             try:
@@ -190,7 +228,7 @@ class _Kept:
                 with suppress(OSError):
                     passing.unlink()
                 continue
-            self._modules, self._new = modules, {}
+            self._files, self._new = files, {}
             return
 
 

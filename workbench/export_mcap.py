@@ -82,7 +82,7 @@ def to_mcap(
     writer.start(profile="", library=_LIBRARY)
     channels: dict[str, int] = {}
     messages = []
-    for run in sorted(runs, key=lambda run: (run.looked.filtered.run.start_utc_ns, run.name)):
+    for run in sorted(runs, key=lambda run: (run.residuals.filtered.run.start_utc_ns, run.name)):
         for topic, stamp, content in chain(_of_run(run), _of_position(*positions.get(run.name, ()))):
             if topic.name not in channels:
                 schema = writer.register_schema(topic.schema, "jsonschema", _schema(topic))
@@ -121,7 +121,7 @@ def _schema(topic: _Topic) -> bytes:
 
 
 def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
-    record = run.looked.filtered.run
+    record = run.residuals.filtered.run
     instant = instants_utc_ns(record)
     begins = _Topic(
         "/run",

@@ -18,7 +18,7 @@ from kempf.pipeline.compare.overshoot import Turn, turns_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
-from kempf.pipeline.predict.run_residuals import Looked, phases_s
+from kempf.pipeline.predict.run_residuals import RunResiduals, phases_s
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
@@ -68,8 +68,8 @@ class Comparison:
         """Say where the model fails, on fitted and on held-out runs apart; None where there are no such runs."""
         misfits: dict[str, Any] = {}
         for sample in (FITTED, HELD_OUT):
-            looked = self._of(sample)
-            misfits[sample] = where(looked) if looked else None
+            residuals = self._of(sample)
+            misfits[sample] = where(residuals) if residuals else None
         return misfits
 
     def marks(self, evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
@@ -80,8 +80,8 @@ class Comparison:
             masks |= marks(self._of(sample), own) if own else {}
         return masks
 
-    def _of(self, sample: str) -> list[Looked]:
-        return [run.looked for run in self.runs if run.sample == sample]
+    def _of(self, sample: str) -> list[RunResiduals]:
+        return [run.residuals for run in self.runs if run.sample == sample]
 
 
 def compare_vessel(

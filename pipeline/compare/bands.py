@@ -18,7 +18,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import BAND, UNITS
 from kempf.pipeline.distributions import beta_quantile, beta_tail
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.run_residuals import Looked
+from kempf.pipeline.predict.run_residuals import RunResiduals
 
 #: edges of the bands, Hz: octaves, so that the waves a ship meets lie within 0.08 to 0.16 Hz
 EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))
@@ -26,7 +26,7 @@ EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))
 _FEWEST = 20
 
 
-def by_band(residuals: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
+def by_band(residuals: Sequence[RunResiduals]) -> dict[str, list[dict[str, Any]]]:
     """Return what each band of frequencies holds, by channel.
 
     Returns
@@ -57,7 +57,7 @@ class _Spectra:
     error: Float
 
 
-def _spectra(run: Looked, channel: int) -> _Spectra | None:
+def _spectra(run: RunResiduals, channel: int) -> _Spectra | None:
     z, e = run.whitened[:, channel], run.free.error[:, channel]
     instants, known = np.flatnonzero(np.isfinite(z)), np.isfinite(e)
     if instants.size < _FEWEST:

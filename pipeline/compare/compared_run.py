@@ -13,7 +13,7 @@ from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import free_run_of
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.prediction import of_free_run, predict
-from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 
 _HEADING = 2
 
@@ -64,7 +64,7 @@ def compare_run(
         overshoots=compare_overshoots(
             run.time_s, run.measured[:, _HEADING], free_run.predicted[:, _HEADING], tuple(turns)
         ),
-        looked=Looked(filtered, sensitivity.passed(filtered, own), free_run, tuple(phases)),
+        residuals=RunResiduals(filtered, sensitivity.passed(filtered, own), free_run, tuple(phases)),
         levels_from=levels_from,
         free_run_error_by_legs=None if legs is None else free_run_of(filtered, *legs).relative_error,
     )

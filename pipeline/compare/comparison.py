@@ -11,7 +11,7 @@ import numpy as np
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.compare.overshoot import OvershootError
 from kempf.pipeline.predict.prediction import Predicted
-from kempf.pipeline.predict.run_residuals import Looked
+from kempf.pipeline.predict.run_residuals import RunResiduals
 
 FITTED, HELD_OUT = "fitted", "held_out"
 #: the order of the command line's JSON
@@ -36,7 +36,7 @@ class ComparedRun:
     free_run_error: float
     overshoots: tuple[OvershootError, ...]
     #: For `kempf.pipeline.compare.misfit.where`.
-    looked: Looked
+    residuals: RunResiduals
     #: Where the noise levels come from, in words.
     levels_from: str
     #: The free-run error with the parameters fitted to legs, where these predict better than the set's; None elsewhere.
@@ -108,7 +108,7 @@ def _started_from(run: ComparedRun) -> dict[str, Any]:
         }
     assert run.predicted.constants is not None
     v, r, psi, force, moment, first, second, bias = (float(x) for x in run.predicted.constants)
-    has, earth = run.looked.filtered.present(), run.looked.filtered.spec.current == "earth"
+    has, earth = run.residuals.filtered.present(), run.residuals.filtered.spec.current == "earth"
     state = {"lateral_speed_m_s": v, "yaw_rate_deg_s": _DEG * r, "heading_from_first_deg": _DEG * psi}
     disturbances = (
         (has[3], "wind_force_m_s2", force),

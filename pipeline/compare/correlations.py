@@ -16,7 +16,7 @@ from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.distributions import chi2_tail, normal_quantile, normal_up_to
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.run_residuals import Looked
+from kempf.pipeline.predict.run_residuals import RunResiduals
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: lags go up to this time, and to so many steps at most
@@ -26,7 +26,7 @@ _WIDTH = float(normal_quantile(0.5 + BAND / 2.0))
 _FEWEST_PAIRS = 20
 
 
-def correlations(residuals: Sequence[Looked]) -> dict[str, Any]:
+def correlations(residuals: Sequence[RunResiduals]) -> dict[str, Any]:
     """Return auto- and cross-correlations of every channel's whitened innovations, over all runs together.
 
     Returns

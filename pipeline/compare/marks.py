@@ -14,18 +14,18 @@ from kempf.pipeline.compare.bins import bins, phases, runs, sides
 from kempf.pipeline.compare.correlations import given_to
 from kempf.pipeline.compare.evidence import ITSELF, Evidence
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.run_residuals import Looked, Samples, samples_of
+from kempf.pipeline.predict.run_residuals import RunResiduals, Samples, samples_of
 
 #: share of the instants of a sample that contribute most to a correlation
 MARKED = 0.1
 
 
-def marks(residuals: Sequence[Looked], evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
+def marks(residuals: Sequence[RunResiduals], evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
     """Return the instants at which evidence shows.
 
     Parameters
     ----------
-    residuals : sequence of Looked
+    residuals : sequence of RunResiduals
         All runs of a sample; at least one.
     evidence : sequence of Evidence
         Of that sample.
@@ -55,7 +55,7 @@ def _group(samples: Samples, finding: Evidence) -> Mask | None:
     return None if groups is None else groups(samples)[finding.which]
 
 
-def _contributing(residuals: Sequence[Looked], finding: Evidence) -> Mask:
+def _contributing(residuals: Sequence[RunResiduals], finding: Evidence) -> Mask:
     """Return the instants that contribute most to a correlation, shape (N,)."""
     parts = []
     for run in residuals:

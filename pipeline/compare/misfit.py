@@ -14,18 +14,18 @@ from kempf.pipeline.compare.correlations import correlations
 from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.compare.worst_windows import worst
 from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
-from kempf.pipeline.predict.run_residuals import Looked, samples_of
+from kempf.pipeline.predict.run_residuals import RunResiduals, samples_of
 
 #: how many groups are named as those that stand out
 _NAMED = 6
 
 
-def where(residuals: Sequence[Looked]) -> dict[str, Any]:
+def where(residuals: Sequence[RunResiduals]) -> dict[str, Any]:
     """Say where a model fails.
 
     Parameters
     ----------
-    residuals : sequence of Looked
+    residuals : sequence of RunResiduals
         All fitted, or all held out; at least one.
 
     Returns

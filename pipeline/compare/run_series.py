@@ -37,7 +37,7 @@ def run_series(run: ComparedRun) -> dict[str, Float | NDArray[np.int64]]:
         ``yaw_rate_rad_s``, what was predicted, as ``yaw_rate_predicted_rad_s``, and, where the model has it, the
         standard deviation of the difference, as ``yaw_rate_std_rad_s``. NaN where nothing was measured or predicted.
     """
-    record, prediction = run.looked.filtered.run, run.predicted
+    record, prediction = run.residuals.filtered.run, run.predicted
     columns: dict[str, Float | NDArray[np.int64]] = {
         "time_utc_ns": instants_utc_ns(record),
         "rudder_angle_rad": record.rudder_rad,

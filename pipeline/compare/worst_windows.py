@@ -11,7 +11,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.run_residuals import Looked
+from kempf.pipeline.predict.run_residuals import RunResiduals
 
 #: a window in instants, and how many windows are shown of each kind
 _WINDOW, _SHOWN = 20, 5
@@ -19,7 +19,7 @@ _FEWEST = 4
 _MS_NS = 1_000_000
 
 
-def worst(residuals: Sequence[Looked]) -> list[dict[str, Any]]:
+def worst(residuals: Sequence[RunResiduals]) -> list[dict[str, Any]]:
     """Return the windows in which the model errs most, worst first, one step ahead and in the free run.
 
     Returns
@@ -41,7 +41,7 @@ def worst(residuals: Sequence[Looked]) -> list[dict[str, Any]]:
     return shown
 
 
-def _one_step(residuals: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+def _one_step(residuals: Sequence[RunResiduals], channel: int, name: str) -> list[dict[str, Any]]:
     windows = []
     for run in residuals:
         for at, mean, count in _windows(run.whitened[:, channel] ** 2):
@@ -52,7 +52,7 @@ def _one_step(residuals: Sequence[Looked], channel: int, name: str) -> list[dict
     return windows
 
 
-def _free(residuals: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+def _free(residuals: Sequence[RunResiduals], channel: int, name: str) -> list[dict[str, Any]]:
     unit, factor = UNITS[name]
     whole = np.concatenate([run.free.error[:, channel] for run in residuals])
     if not np.isfinite(whole).any():
@@ -84,7 +84,7 @@ def _windows(square: Float) -> list[tuple[int, float, int]]:
     return windows
 
 
-def _window(residuals: Looked, at: int) -> dict[str, Any]:
+def _window(residuals: RunResiduals, at: int) -> dict[str, Any]:
     run = residuals.filtered.run
     end = min(at + _WINDOW, run.time_s.size) - 1
     names, counts = np.unique(residuals.phase_of[at : end + 1], return_counts=True)

@@ -32,7 +32,7 @@ _SEEN = 2.0
 
 
 @dataclass(eq=False)
-class Certain:
+class LikelihoodFindings:
     """What the likelihood found."""
 
     #: The ladder with what matters.
@@ -42,9 +42,9 @@ class Certain:
     suspected: dict[str, str] = field(default_factory=dict)
 
 
-def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
+def certain_ones(ladder: Ladder, steps: list[Step]) -> LikelihoodFindings:
     """Add what the likelihood is sure of to a ladder."""
-    findings = Certain(steps)
+    findings = LikelihoodFindings(steps)
     while len(findings.steps) + len(findings.immaterial) <= ladder.settings.most_steps:
         last = findings.steps[-1]
         tried = _refitted(ladder, findings)
@@ -100,7 +100,7 @@ def only_fitted(tried: Sequence[tuple[Candidate, Confirmation]]) -> dict[str, st
     }
 
 
-def _refitted(ladder: Ladder, findings: Certain) -> list[tuple[Candidate, Confirmation]]:
+def _refitted(ladder: Ladder, findings: LikelihoodFindings) -> list[tuple[Candidate, Confirmation]]:
     """Refit what is certain beside everything found so far."""
     last, fit = findings.steps[-1], ladder.probe
     screened: Sequence[Candidate] = last.screened
@@ -133,7 +133,7 @@ def _refitted(ladder: Ladder, findings: Certain) -> list[tuple[Candidate, Confir
 
 
 def _kept(
-    ladder: Ladder, findings: Certain, best: Sequence[tuple[Candidate, Confirmation]]
+    ladder: Ladder, findings: LikelihoodFindings, best: Sequence[tuple[Candidate, Confirmation]]
 ) -> list[tuple[tuple[Candidate, Confirmation], Ahead | None]]:
     """Return those of the best that make no prediction one leg ahead worse, with the model one leg ahead."""
     last, kept = findings.steps[-1], []

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import Confirmation, unpredicted
+from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, unpredicted
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
@@ -140,7 +140,7 @@ def refusal(confirmation: Confirmation) -> str:
     size = _unusable_size(confirmation)
     if size:
         return size
-    if confirmation.bic_change > -6.0:
+    if confirmation.bic_change >= -BIC_SAVING:
         return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
     if not confirmation.predicts:
         return unpredicted(confirmation)

@@ -44,9 +44,9 @@ def solved(columns: Float, errors: Float, effect: Effect, steps: tuple[float, ..
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
     gradient = columns.T @ errors
     estimate = inverse @ gradient
-    making = np.array([not p.shapes for p in effect.parameters])
+    makes = np.array([not p.shapes for p in effect.parameters])
     change, std = np.array(steps, dtype=np.float64), np.full(len(steps), np.nan)
-    change[making], std[making] = estimate, np.sqrt(np.diag(inverse))
+    change[makes], std[makes] = estimate, np.sqrt(np.diag(inverse))
     return Solved(float(gradient @ estimate), estimate, change, std)
 
 

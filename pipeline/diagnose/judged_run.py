@@ -13,7 +13,7 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.levels import fit_levels
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,7 @@ class JudgedRun:
     #: misfit.
     point: Point
     #: One step ahead and in free run.
-    residuals: Looked
+    residuals: RunResiduals
 
     @property
     def settles(self) -> bool:
@@ -44,7 +44,7 @@ def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]]) -> 
     return tuple(
         JudgedRun(
             Point(fit.hull, fit.values, levels),
-            Looked(filtered, line.passed, free, tuple(phases.get(filtered.run.name, ()))),
+            RunResiduals(filtered, line.passed, free, tuple(phases.get(filtered.run.name, ()))),
         )
         for filtered, levels, line, free in zip(fit.runs, fit.levels, fit.linearised, step.fitted, strict=True)
     )
@@ -69,5 +69,5 @@ def judged_held_out(
         levels = fit_levels(filtered, fit.hull, fit.values, usual).levels
         point = Point(fit.hull, fit.values, levels)
         passed = sensitivity.passed(filtered, point)
-        judged.append(JudgedRun(point, Looked(filtered, passed, free, tuple(phases.get(run.name, ())))))
+        judged.append(JudgedRun(point, RunResiduals(filtered, passed, free, tuple(phases.get(run.name, ())))))
     return tuple(judged)

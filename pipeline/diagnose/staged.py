@@ -73,7 +73,7 @@ def staged(
                 "effect_not_testable",
                 f"The logs have {', '.join(candidate.measured_by)}, which measures {effect.title} already.",
                 "The model uses that channel; nothing need be added.",
-                {"effect": effect.name, "told_by": list(candidate.measured_by)},
+                {"effect": effect.name, "measured_by": list(candidate.measured_by)},
             )
         if np.isnan(candidate.score):
             raise DataRejected(

@@ -99,15 +99,15 @@ def _smooth(column: Float, width: int) -> Float | None:
 
 def beyond(predicted: Reach, logs: Reach) -> tuple[Beyond, ...]:
     """Return in what a prediction goes beyond the logs."""
-    quantities = []
+    exceeded = []
     for quantity, there, here, unit in (
         ("drift", degrees(predicted.drift_rad), degrees(logs.drift_rad), "deg"),
         ("yaw_rate", predicted.yaw_rate, logs.yaw_rate, ""),
         ("rudder", degrees(predicted.rudder_rad), degrees(logs.rudder_rad), "deg"),
     ):
         if not there <= _BESIDE * here:
-            quantities.append(Beyond(quantity, (0.0, there), (0.0, here), unit))
+            exceeded.append(Beyond(quantity, (0.0, there), (0.0, here), unit))
     if predicted.slowest_m_s * _BESIDE < logs.slowest_m_s or predicted.fastest_m_s > _BESIDE * logs.fastest_m_s:
         sailed = (predicted.slowest_m_s, predicted.fastest_m_s)
-        quantities.append(Beyond("speed", sailed, (logs.slowest_m_s, logs.fastest_m_s), "m/s"))
-    return tuple(quantities)
+        exceeded.append(Beyond("speed", sailed, (logs.slowest_m_s, logs.fastest_m_s), "m/s"))
+    return tuple(exceeded)

@@ -25,8 +25,8 @@ class PhaseInterval:
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
-    """One run under one model."""
+class RunResiduals:
+    """What a model leaves of one run: innovations one step ahead, and the errors of a free run."""
 
     filtered: RunFilter
     #: Of the fitted model, with the run's noise levels.
@@ -89,24 +89,24 @@ class Samples:
     speed_m_s: Float
 
 
-def samples_of(looked: Sequence[Looked]) -> Samples:
+def samples_of(residuals: Sequence[RunResiduals]) -> Samples:
     """Put the instants of all runs one after the other.
 
     Parameters
     ----------
-    looked : sequence of Looked
+    residuals : sequence of RunResiduals
         At least one.
     """
-    runs = [look.filtered.run for look in looked]
-    predicted = np.concatenate([look.passed.predicted for look in looked])
+    records = [run.filtered.run for run in residuals]
+    predicted = np.concatenate([run.passed.predicted for run in residuals])
     return Samples(
-        whitened=np.concatenate([look.whitened for look in looked]),
-        free_error=np.concatenate([look.free.error for look in looked]),
-        phase=np.concatenate([look.phase_of for look in looked]),
-        run=np.concatenate([np.full(run.measured.shape[0], run.name) for run in runs]),
+        whitened=np.concatenate([run.whitened for run in residuals]),
+        free_error=np.concatenate([run.free.error for run in residuals]),
+        phase=np.concatenate([run.phase_of for run in residuals]),
+        run=np.concatenate([np.full(record.measured.shape[0], record.name) for record in records]),
         lateral_speed_m_s=predicted[:, 0],
         yaw_rate_rad_s=predicted[:, 1],
-        rudder_rad=np.concatenate([run.rudder_rad for run in runs]),
-        heading_rad=np.concatenate([run.heading_rad for run in runs]),
-        speed_m_s=np.concatenate([run.speed_m_s for run in runs]),
+        rudder_rad=np.concatenate([record.rudder_rad for record in records]),
+        heading_rad=np.concatenate([record.heading_rad for record in records]),
+        speed_m_s=np.concatenate([record.speed_m_s for record in records]),
     )

@@ -96,7 +96,9 @@ def circle_figures(
     agreed = drift is not None and drift.seen and is_current(drift, track, begin)
     freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
     corrected = freed if agreed else track
-    over_ground, less_drift, circle = (turning_figures(*_columns(path), begin) for path in (track, freed, corrected))
+    over_ground, less_drift, corrected_figures = (
+        turning_figures(*_columns(path), begin) for path in (track, freed, corrected)
+    )
     if through_water:
         reasons.append("The track is made of the water log's speed along the heading: the drift angle is left out.")
     elif source != "heading alone" and drift is None:
@@ -116,16 +118,16 @@ def circle_figures(
             )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
-    spread = _steady_spread(corrected, begin, course, circle)
+    spread = _steady_spread(corrected, begin, course, corrected_figures)
     uncertain = 0.0 if drift is None or (drift.seen and not agreed) else drift.std_m_s
     nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
     figures: dict[str, Figure] = {}
-    values = asdict(circle)
+    values = asdict(corrected_figures)
     for name in _FROM_EXECUTE:
         figures[name] = _from_execute(name, values[name], nudged, track, execute_s)
     short = "the heading changed by less than a whole turn"
     for name in _STEADY:
-        missing = "not recorded" if abs(circle.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
+        missing = "not recorded" if abs(corrected_figures.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
         figures[name] = Figure.of(values[name], spread[name], missing)
     if not np.isfinite(course_std_rad):
         figures["speed_loss_percent"] = Figure.of(nan, nan, "the approach was not steady or is not recorded")

@@ -14,7 +14,7 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.free_run import free_run_of
-from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 from kempf.pipeline.simulate.trial import Trial
 from kempf.schemas.model_spec import ModelSpec
 from tests.estimate.simulated import instruments_of, record_of
@@ -60,7 +60,7 @@ def sailed_by_model(
     return RunFilter(replace(exact, measured=clean + noise), EffectModel(), QUIET)
 
 
-def looked_at(filtered: RunFilter, hull: np.ndarray, phases: tuple[PhaseInterval, ...] = ()) -> Looked:
+def looked_at(filtered: RunFilter, hull: np.ndarray, phases: tuple[PhaseInterval, ...] = ()) -> RunResiduals:
     point = Point(hull, np.zeros(0), levels_of())
     free = free_run_of(filtered, hull, np.zeros(0))
-    return Looked(filtered, sensitivity.passed(filtered, point), free, phases)
+    return RunResiduals(filtered, sensitivity.passed(filtered, point), free, phases)

@@ -11,11 +11,11 @@ from kempf.pipeline.compare.evidence import ITSELF, evidence_in
 from kempf.pipeline.compare.marks import MARKED, marks
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.run_residuals import Looked
+from kempf.pipeline.predict.run_residuals import RunResiduals
 from tests.compare.test_where import RUN, looked
 
 
-def late(*seeds: int) -> list[Looked]:
+def late(*seeds: int) -> list[RunResiduals]:
     return [looked(seed, late_s=4 * RUN.step_s, name=f"seg-{seed}") for seed in seeds]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from kempf.pipeline.compare.group import rms_band
 from kempf.pipeline.compare.misfit import where
-from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 from tests.compare.seen import NOISE, QUIET, looked_at, run_of, sailed_by_model
 from tests.estimate.simulated import sailed, truth_of
 
@@ -32,7 +32,7 @@ def phases() -> tuple[PhaseInterval, ...]:
     )
 
 
-def looked(seed: int = 1, late_s: float = 0.0, name: str = "seg-1") -> Looked:
+def looked(seed: int = 1, late_s: float = 0.0, name: str = "seg-1") -> RunResiduals:
     return looked_at(sailed_by_model(replace(RUN, name=name), HULL, seed=seed, late_s=late_s), HULL, phases())
 
 

@@ -10,7 +10,9 @@ from importlib.metadata import PathDistribution, distributions
 from pathlib import Path
 
 import pytest
+import yaml
 
+from kempf.schemas.effect import Effect
 from kempf.warehouse import code_version
 from kempf.warehouse.code_version import Stage
 from kempf.warehouse.source_tree import read_module
@@ -52,6 +54,19 @@ def test_stages_count_what_is_theirs() -> None:
     assert "kempf.pipeline.estimate.likelihood" in of["estimate"] - of["segment"]
     assert of["ingest"] <= of["segment"] and of["ingest"] <= of["estimate"] <= of["diagnose"] >= of["segment"]
     assert "kempf.pipeline.model.effects.rudder_lag" in of["estimate"], "code of an effect of the catalogue"
+
+
+@pytest.mark.parametrize("key", Effect.model_fields)
+def test_words_about_an_effect_make_diagnoses_anew_at_most(tmp_path: Path, key: str) -> None:
+    for room in ("pipeline", "schemas"):
+        shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__"))
+    before = {stage: code_version.fingerprint_in(tmp_path, stage) for stage in ("estimate", "diagnose")}
+    path = tmp_path / "schemas" / "effects" / "cross_flow_drag.yaml"
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), key: "otherwise"}))
+    moved = {stage for stage, digest in before.items() if code_version.fingerprint_in(tmp_path, stage) != digest}
+    words = {"title", "plain", "separated_by"}
+    shown = {"equation", "reference", "confounded_with"}
+    assert moved == (set() if key in shown else {"diagnose"} if key in words else {"estimate", "diagnose"})
 
 
 def test_packages_are_named_with_their_versions() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from kempf.warehouse import source_tree
-from kempf.warehouse.source_tree import SourceTree, read_module
+from kempf.warehouse.source_tree import SourceTree, read_module, read_yaml
 
 CALLER = """
 from kempf.pipeline.rooms import b
@@ -85,6 +85,38 @@ def test_what_is_opened_by_name_counts(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
+    "text", ["# why\ntau: 3\n", "tau:   3\n\n", "{tau: 3}", "tau: 3\nplain: other words\n", "plain: a\ntau: 3\n"]
+)
+def test_comments_order_and_keys_left_out_of_a_data_file_do_not_count(text: str) -> None:
+    assert read_yaml(text.encode(), ["plain"]) == read_yaml(b"tau: 3\n", ["plain"])
+
+
+@pytest.mark.parametrize(
+    "text", ["tau: 3.0", "tau: '3'", "tau: 4", "t: 3", "tau: [3]", "tau: {unit: s}", "tau: [3", ""]
+)
+def test_whatever_a_data_file_says_otherwise_counts(text: str) -> None:
+    assert read_yaml(text.encode()) != read_yaml(b"tau: 3\n")
+
+
+def test_keys_are_left_out_however_deep_they_stand() -> None:
+    before = b"parameters: {c: {meaning: a, low: 0}}\nstates: [{plain: b}]"
+    after = b"parameters: {c: {meaning: x, low: 0}}\nstates: [{plain: y}]"
+    assert read_yaml(before, ["meaning", "plain"]) == read_yaml(after, ["meaning", "plain"])
+    assert read_yaml(before, ["meaning"]) != read_yaml(after, ["meaning"])
+
+
+def test_a_data_file_is_kept_by_what_was_left_out(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lag(*left_out: str) -> str:
+        entry = SourceTree(folder, ["pipeline"]).reached(["kempf.pipeline.catalogue"], left_out)
+        return entry["pipeline/catalogue/data/lag.yaml"]
+
+    whole, without = lag(), lag("tau")
+    assert whole != without
+    monkeypatch.setattr(source_tree, "read_yaml", lambda *_: pytest.fail("read again"))
+    assert (lag(), lag("tau")) == (whole, without)
+
+
+@pytest.mark.parametrize(
     "text",
     [
         "def f(x):\n    return 2*x\n",
@@ -120,7 +152,7 @@ def test_what_was_found_is_kept_and_believed_only_for_the_same_bytes(
     folder: Path, places: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = reached(folder)
-    kept = json.loads(places[0].read_text())["modules"]
+    kept = json.loads(places[0].read_text())["files"]
     assert len(kept) == len({BASE[path] for path in REACHED.values()})
     with monkeypatch.context() as patched:
         patched.setattr(source_tree, "read_module", lambda _: pytest.fail("parsed again"))
@@ -130,7 +162,9 @@ def test_what_was_found_is_kept_and_believed_only_for_the_same_bytes(
     assert {name for name in before if before[name] != after[name]} == {"kempf.pipeline.tail"}
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"form": 0}', '{"form": 1, "modules": {"a": 1}}', "\x00"])
+@pytest.mark.parametrize(
+    "content", ["", "[]", '{"form": 0}', '{"form": 2, "files": {"a": 1}}', '{"form": 2, "files": 1}', "\x00"]
+)
 def test_what_was_kept_and_is_damaged_is_made_anew(folder: Path, places: list[Path], content: str) -> None:
     before = reached(folder)
     places[0].write_text(content)

@@ -34,9 +34,9 @@ def to_do(warehouse: Warehouse) -> list[str]:
     pointed = _pointed(warehouse)
     if pointed:
         phrases.append(f"{len(pointed)} aliases of before there was 'current' become 'current'")
-    commits = sealing.unsealed(warehouse)
-    if commits:
-        phrases.append(f"{commits} commits of tables are sealed")
+    unsealed = sealing.unsealed(warehouse)
+    if unsealed:
+        phrases.append(f"{unsealed} commits of tables are sealed")
     logs = len(deposit.not_described(warehouse))
     if logs:
         phrases.append(f"{logs} raw logs are described beside their bytes")

@@ -64,7 +64,7 @@ def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
 def _panel(panel: Any, run: ComparedRun, name: str) -> None:
     prediction, i = run.predicted, CHANNELS.index(name)
     unit, factor = UNITS[name]
-    measured = factor * run.looked.filtered.run.measured[:, i]
+    measured = factor * run.residuals.filtered.run.measured[:, i]
     known = np.isfinite(measured)
     panel.plot(prediction.time_s[known], measured[known], color="0.55", lw=2.2, label="measured")
     predicted = factor * prediction.predicted[:, i]
