@@ -27,10 +27,15 @@ def shot(tab: Page, name: str, height: int) -> None:
     print(path)
 
 
-def story(page: Opened) -> None:
+def story(page: Opened, log_file: Path, profile: Path) -> None:
     """Go through the pages as an engineer would."""
     tab, base, vessel = page.tab, page.base, late_rudder.VESSEL
     hers = f"{base}/v/{vessel}"
+    tab.goto(f"{base}/ingest")
+    tab.set_input_files("[name=log]", log_file)
+    tab.set_input_files("[name=profile]", profile)
+    tab.check("[name=new_vessel]")
+    shot(tab, "ingest", 430)
     log = page.json(f"/v/{vessel}/logs.json")[0]["log_id"]
     tab.goto(f"{base}/logs/{log}")
     tab.wait_for_selector("body[data-ready=yes]")
@@ -97,10 +102,10 @@ def main() -> None:
     with TemporaryDirectory() as place:
         folder = Path(place)
         late_rudder.write(folder)
-        files = (folder / "day.mcap", "--profile", folder / "late.yaml")
-        subprocess.run([*KEMPF, "ingest", *files, "--warehouse", folder / "w"], check=True)
+        log_file, profile = folder / "day.mcap", folder / "late.yaml"
+        subprocess.run([*KEMPF, "ingest", log_file, "--profile", profile, "--warehouse", folder / "w"], check=True)
         with opened(folder / "w", folder / "state", width=1000) as page:
-            story(page)
+            story(page, log_file, profile)
         docked_ns = new_rudder.write(folder / "refitted")
         at = ("--warehouse", folder / "r")
         vessel = ("--vessel", new_rudder.VESSEL)

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from kempf.workbench.web.jobs.keeper import Keeper
 from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.settings import Settings
 from tests.workbench.conftest import _filled, filled, logs, own  # noqa: F401
+from tests.workbench.web.browsing import BROWSER, Server, served
 
 TOKEN = "of-this-test"  # noqa: S105
 OURS = {"origin": "http://127.0.0.1"}
@@ -69,3 +71,19 @@ def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Que
     """A browser that may write, and an engine at work."""
     with at_work(own, tmp_path / "state") as one:
         yield one
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        one = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield one
+        one.close()
+
+
+@pytest.fixture
+def server(late_ingested: Path, tmp_path: Path) -> Iterator[Server]:
+    """The pages of a ship whose rudder answers late, one log, nothing identified yet."""
+    yield from served(copytree(late_ingested / "w", tmp_path / "w"), tmp_path / "state")

@@ -14,8 +14,8 @@ from starlette.testclient import TestClient
 from kempf.flows.process.progress import Figures
 from kempf.workbench.web.jobs.queue import FAILED, RUNNING, Queue, Tick
 from kempf.workbench.web.jobs.ticking import Ticking
+from tests.workbench.web.browsing import NEEDS_BROWSER, Server, opened
 from tests.workbench.web.conftest import until
-from tests.workbench.web.test_story import BROWSER, Server, browser, opened, server  # noqa: F401
 
 #: two models: the plain one and one with an effect, which begins lower than the first has come to
 CLIMB = [
@@ -125,10 +125,10 @@ def test_quick_iterations_are_written_together_and_none_is_lost(queue: Queue):
     assert [one.figures.iteration for one in found if one.figures] == list(range(1, 101))
 
 
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; KEMPF_CHROMIUM names one")
+@NEEDS_BROWSER
 def test_the_curve_grows_while_the_job_runs_and_is_the_same_after_a_reload(
-    browser: Any,  # noqa: F811
-    server: Server,  # noqa: F811
+    browser: Any,
+    server: Server,
     queue: Queue,
 ):
     # an engine that begins puts jobs that seem to run back into the queue: it is to have begun

@@ -1,111 +1,28 @@
-"""An engineer's way through the pages in a real browser, and every page on it by axe; skipped where there is none."""
+"""An engineer's way through the pages in a real browser; skipped where there is none."""
 
 from __future__ import annotations
 
-import os
 import re
-import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import copytree
 from typing import Any
 
-import httpx
 import pytest
 
 from kempf.flows.jobs.standing_model import PLAIN, Own
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.report.build import make_report
 from tests.late import VESSEL, some_effects
-from tests.workbench.driving import START, environment
+from tests.workbench.web.browsing import NEEDS_BROWSER, Server, accessible, opened, reach, served
 
-BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
-BROWSER = os.environ.get("KEMPF_CHROMIUM") or next((found for name in BROWSERS if (found := shutil.which(name))), None)
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; KEMPF_CHROMIUM names one")
-WAIT_MS = 120_000
-
-
-@dataclass
-class Server:
-    """`kempf workbench` in a process of its own."""
-
-    process: subprocess.Popen[str]
-    start: str
-    warehouse: Path
-    #: What the browser complained of.
-    complaints: list[str] = field(default_factory=list)
-
-    @property
-    def base(self) -> str:
-        return self.start.partition("/?")[0]
-
-    def json(self, path: str) -> Any:
-        return httpx.get(self.base + path).json()
-
-
-@pytest.fixture
-def server(late_ingested: Path, tmp_path: Path) -> Iterator[Server]:
-    """The pages of a ship whose rudder answers late, one log, nothing identified yet."""
-    yield from served(copytree(late_ingested / "w", tmp_path / "w"), tmp_path / "state")
+pytestmark = NEEDS_BROWSER
 
 
 @pytest.fixture
 def empty(tmp_path: Path) -> Iterator[Server]:
     """The pages of a warehouse that is new."""
     yield from served(tmp_path / "new", tmp_path / "state", "--new")
-
-
-def served(place: Path, state: Path, *options: str) -> Iterator[Server]:
-    process = subprocess.Popen(
-        [sys.executable, "-c", START, "workbench", "--warehouse", place, "--state", state, "--port", "0", *options],
-        stderr=subprocess.PIPE,
-        text=True,
-        env=environment(),
-    )
-    assert process.stderr is not None
-    line = process.stderr.readline()
-    found = re.search(r"http://\S+", line)
-    assert found, line
-    try:
-        yield Server(process, found.group(), place)
-    finally:
-        process.send_signal(signal.SIGINT)
-        process.wait(30)
-        process.stderr.close()
-
-
-@pytest.fixture
-def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        one = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield one
-        one.close()
-
-
-def opened(browser: Any, server: Server, **options: Any) -> Any:
-    """A tab in which a complaint of the browser is one of the test's."""
-    tab = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options}).new_page()
-    tab.set_default_timeout(WAIT_MS)
-    tab.on("console", lambda message: server.complaints.append(message.text))
-    tab.on("pageerror", lambda error: server.complaints.append(str(error)))
-    return tab
-
-
-def reach(tab: Any, selector: str, key: str = "Enter") -> None:
-    """Go to an element as one who has no mouse does, by the tab key, and press it."""
-    wanted = tab.wait_for_selector(selector)
-    for _ in range(400):
-        if wanted.evaluate("node => node === document.activeElement"):
-            tab.keyboard.press(key)
-            return
-        tab.keyboard.press("Tab")
-    raise AssertionError(f"the tab key does not reach {selector} on {tab.url}")
 
 
 def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
@@ -186,47 +103,6 @@ def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
     other.goto(found)
     assert "rudder_lag" in other.inner_text("main") and other.query_selector("main button") is None
     assert server.complaints == []
-
-
-def accessible(tab: Any) -> None:
-    """Let axe look at a page, which is no wider than its window."""
-    from axe_playwright_python.sync_playwright import Axe
-
-    violations = Axe().run(tab).response["violations"]
-    assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == [], tab.url
-    assert tab.evaluate("document.documentElement.scrollWidth <= innerWidth"), tab.url
-
-
-@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
-def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme: str, width: int):
-    tab = opened(browser, server, color_scheme=scheme, viewport={"width": width, "height": 900})
-    log = server.json(f"/v/{VESSEL}/logs.json")[0]["log_id"]
-    segment = server.json(f"/v/{VESSEL}/segments.json")[0]["segment_id"]
-    tab.goto(server.start)  # one that may write sees more
-    for path in (
-        "/",
-        "/ingest",
-        "/compare",
-        f"/v/{VESSEL}",
-        f"/v/{VESSEL}/changes",
-        f"/logs/{log}",
-        f"/segments/{segment}",
-        "/effects",
-        "/effects/rudder_lag",
-        "/none",
-    ):
-        tab.goto(server.base + path)
-        if "log" in path or "segment" in path:
-            tab.wait_for_selector("body[data-ready=yes]")
-        accessible(tab)
-    tab.goto(server.base + f"/segments/{segment}")
-    tab.select_option("[name=action]", "exclude")
-    tab.fill("[name=reason]", "tugs alongside")
-    tab.click("button:has-text('Preview')")
-    tab.click("button:has-text('Store it')")
-    tab.wait_for_selector(".warning:has-text('tugs alongside')")
-    accessible(tab)
-    assert [words for words in server.complaints if "404" not in words] == []
 
 
 def test_a_chart_is_zoomed_and_the_window_is_in_the_address(browser: Any, server: Server):
