@@ -35,7 +35,7 @@ def story(page: Opened, log_file: Path, profile: Path) -> None:
     tab.set_input_files("[name=log]", log_file)
     tab.set_input_files("[name=profile]", profile)
     tab.check("[name=new_vessel]")
-    shot(tab, "ingest", 430)
+    shot(tab, "ingest", 350)
     log = page.json(f"/v/{vessel}/logs.json")[0]["log_id"]
     tab.goto(f"{base}/logs/{log}")
     tab.wait_for_selector("body[data-ready=yes]")
