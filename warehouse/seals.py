@@ -10,8 +10,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import secrets
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -21,6 +19,7 @@ from typing import TYPE_CHECKING, Literal
 from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError
+from kempf.warehouse.whole_file import whole_file
 
 if TYPE_CHECKING:
     from deltalake import DeltaTable
@@ -318,14 +317,8 @@ def _file_seal(folder: Path, path: str) -> Path:
 
 def _write(path: Path, data: bytes) -> None:
     """Write a seal, all of it or nothing."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    passing = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    try:
+    with whole_file(path) as passing:
         passing.write_bytes(data)
-        os.replace(passing, path)  # noqa: PTH105 - in place of what is there, on every system
-    except BaseException:
-        passing.unlink(missing_ok=True)
-        raise
 
 
 def mend_log(folder: Path, name: str) -> list[str]:

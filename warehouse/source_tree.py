@@ -12,7 +12,6 @@ from __future__ import annotations
 import ast
 import json
 import os
-import secrets
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from kempf.schemas import yaml_text
+from kempf.warehouse.whole_file import whole_file
 
 #: Name of the package, and the part of it that makes logs: a log counts by its own bytes.
 _PACKAGE, _SIMULATOR = "kempf", "pipeline.simulate"
@@ -219,17 +219,11 @@ class _Kept:
         files = {**self._files, **self._new} if len(self._files) < _MOST_KEPT else self._new
         text = json.dumps({"form": _FORM, "files": files}, separators=(",", ":"))
         for place in _places():
-            passing = place.with_name(f"{place.name}.{secrets.token_hex(8)}")
-            try:
-                place.parent.mkdir(parents=True, exist_ok=True)
-                passing.write_text(text, encoding="utf-8")
-                passing.replace(place)
-            except OSError:
-                with suppress(OSError):
-                    passing.unlink()
-                continue
-            self._files, self._new = files, {}
-            return
+            with suppress(OSError):
+                with whole_file(place) as passing:
+                    passing.write_text(text, encoding="utf-8")
+                self._files, self._new = files, {}
+                return
 
 
 def _places() -> list[Path]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from kempf.schemas.errors import UsageError
+from kempf.warehouse.whole_file import whole_file
 
 _FIGURES = (".png", ".svg", ".pdf")
 
@@ -107,12 +107,5 @@ def replaced(path: Path) -> Iterator[Path]:
     UsageError
         ``cannot_write``.
     """
-    passing = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with writing(path, "FOLDER"), whole_file(path) as passing:
         yield passing
-        passing.replace(path)
-    except OSError as error:
-        raise _cannot_write(path, error.strerror or str(error), "FOLDER") from error
-    finally:
-        passing.unlink(missing_ok=True)

@@ -8,7 +8,6 @@ from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
@@ -16,6 +15,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import Request
 
 from kempf.schemas.errors import KempfError, UsageError
+from kempf.warehouse.whole_file import whole_file
 
 #: bytes of all files of a form together, files of a form, forms that may arrive at once
 MOST_BYTES, MOST_FILES, AT_ONCE = 256 * 2**20, 40, 2
@@ -94,15 +94,8 @@ class Uploads:
             digest.update(block)
         file.file.seek(0)
         to = self.folder / digest.hexdigest() / base_name(file.filename or "")
-        to.parent.mkdir(parents=True, exist_ok=True)
-        # a name of its own, since the same file may be arriving twice
-        part = to.with_name(f"{uuid4().hex}.part")
-        try:
-            with part.open("wb") as target:
-                shutil.copyfileobj(file.file, target, _BLOCK)
-            part.replace(to)
-        finally:
-            part.unlink(missing_ok=True)
+        with whole_file(to) as passing, passing.open("wb") as target:  # the same file may be arriving twice
+            shutil.copyfileobj(file.file, target, _BLOCK)
         return f"{to.parent.name}/{to.name}"
 
     def _forget_the_oldest(self) -> None:

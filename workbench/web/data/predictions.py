@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.store import Warehouse
+from kempf.warehouse.whole_file import whole_file
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -66,7 +66,6 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
     from kempf.pipeline.compare.run_series import run_series
 
     folder = state / "predictions"
-    folder.mkdir(parents=True, exist_ok=True)
     where = comparison.where()
     document = json.dumps({**comparison.show(), "where": where})
     columns: dict[str, NDArray[Any]] = {
@@ -74,10 +73,8 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
     }
     for evidence, by_run in comparison.marks(evidence_in(where)).items():
         columns |= {f"{name}/{MARK}{evidence}": inside for name, inside in by_run.items()}
-    part = folder / f"{key}.{os.getpid()}.part"
-    with part.open("wb") as file:
+    with whole_file(folder / f"{key}.npz") as passing, passing.open("wb") as file:
         np.savez(file, allow_pickle=False, document=np.frombuffer(document.encode(), dtype=np.uint8), **columns)
-    part.replace(folder / f"{key}.npz")
     held = sorted(folder.glob("*.npz"), key=lambda path: (path.stat().st_mtime_ns, path.name))
     for path in held[:-_MOST]:
         path.unlink()
