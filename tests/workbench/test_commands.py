@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import gzip
 import re
+import subprocess
+import sys
 from datetime import datetime
 from pathlib import Path
 
 import pytest
 import yaml
 
+from kempf.workbench.cli.diagnose import next_commands
 from kempf.workbench.cli.entry import COMMANDS
 from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, refused, tree, versions
@@ -74,6 +77,8 @@ def test_segments(filled: Path):
     output = kempf("segments", "--warehouse", filled)
     assert output.code == 0
     assert all(one["segment_id"][:12] in output.out for one in found), "the beginning distinguishes them"
+    assert len({one["start"][:16] for one in found}) == 1
+    assert all(Path(one["log"]).name in output.out for one in found), "those that begin alike are named by their logs"
 
 
 def test_reprocess_of_one_vessel(filled: Path):
@@ -184,6 +189,18 @@ def test_the_version_is_that_of_the_package():
     from importlib.metadata import version
 
     assert kempf("--version").out == f"kempf, version {version('kempf')}\n"
+    as_module = subprocess.run([sys.executable, "-m", "kempf", "--version"], capture_output=True, text=True, check=True)
+    assert as_module.stdout.endswith(f", version {version('kempf')}\n")
+
+
+def test_what_comes_after_a_diagnosis_is_all_that_it_names():
+    sets = [{"effects": ["propeller_wash"]}, {"effects": ["wind_force"]}, {"effects": ["cross_flow_drag", "yaw_v3"]}]
+    assert next_commands({"vessel": "osaka", "sets": sets}) == [
+        "kempf effects add propeller_wash --vessel osaka",
+        "kempf effects add wind_force --vessel osaka",
+        "kempf effects add cross_flow_drag --vessel osaka",
+        "kempf ladder --vessel osaka",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -136,10 +136,18 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         click.echo(f"  {', '.join(effects)}: {why}")
     if not everything and len(document["candidates"]) > _SHOWN:
         click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
-    claimed = next((name for group in document["sets"] for name in group["effects"]), None)
-    if claimed:
-        vessel = document["vessel"]
-        click.echo(f"next: kempf effects add {claimed} --vessel {vessel}, kempf ladder --vessel {vessel}")
+    if document["sets"]:
+        click.echo(f"next: {', '.join(next_commands(document))}")
+
+
+def next_commands(document: Mapping[str, Any]) -> list[str]:
+    """Return the commands that add what a diagnosis names: of every set the first effect, in the order of its ladder.
+
+    All of them, as of effects that belong together one alone may make predictions worse.
+    """
+    vessel = document["vessel"]
+    adds = [f"kempf effects add {group['effects'][0]} --vessel {vessel}" for group in document["sets"]]
+    return [*adds, f"kempf ladder --vessel {vessel}"]
 
 
 def _first_model(step: Mapping[str, Any]) -> str:

@@ -54,10 +54,11 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
         print_json(listed.documents)
         return
     segments = listed.found
+    file_of = {s.segment_id: log["log"] for s, log in zip(segments, listed.documents, strict=True)}
     short = short_ids(segment.segment_id for segment in segments)
     zigzags = [segment for segment in segments if segment.is_zigzag]
     if zigzags:
-        _print_zigzags(zigzags, short)
+        _print_zigzags(zigzags, short, file_of)
     else:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
     for segment, document in zip(segments, listed.documents, strict=True):
@@ -73,13 +74,18 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
             click.echo(f"warning: {one_line(log['log'])}: {one_line(words)}")
 
 
-def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None:
-    """Print a table, a zigzag a row."""
+def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str], file_of: Mapping[str, str]) -> None:
+    """Print a table, a zigzag a row; with the log where those of several logs begin alike."""
     from kempf.warehouse.instant import iso_utc
 
+    logs_at: dict[tuple[str, str], set[str]] = {}
+    for s in zigzags:
+        logs_at.setdefault((s.vessel, iso_utc(s.start_utc_ns)[:16]), set()).add(s.log_id)
+    alike = any(len(logs) > 1 for logs in logs_at.values())
     rows = [
         [
             short[s.segment_id],
+            *([one_line(file_of[s.segment_id])] if alike else []),
             s.vessel,
             f"{s.psi0_deg:g}/{s.delta0_deg:g}" if s.kind == "zigzag" else s.words,
             s.first_side,
@@ -90,7 +96,7 @@ def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None
         ]
         for s in zigzags
     ]
-    head = ["segment", "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
+    head = ["segment", *(["log"] if alike else []), "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
     click.echo("zigzag: heading at which the rudder is reversed / rudder angle, deg; K0: heading before it")
 
