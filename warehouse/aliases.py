@@ -16,6 +16,8 @@ from kempf.warehouse.store import Warehouse
 
 #: the set that every command takes unless another is named
 CURRENT = "current"
+#: the set that was `CURRENT` until it was withdrawn; gone once there is a current one again
+WITHDRAWN = "withdrawn"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9._-]{0,63}")
 
 
@@ -109,12 +111,18 @@ def point_all(
                 # of one name only: several would also name what is not among them
                 of = {alias: [rows[key]["vessel_key"] for key in changed if key[1] == alias] for _, alias in changed}
                 predicate = " OR ".join(
-                    f"({one_of('vessel_key', whose)} AND alias = {quoted(alias)})" for alias, whose in of.items()
+                    f"({one_of('vessel_key', whose)} AND {one_of('alias', _in_place_of(alias))})"
+                    for alias, whose in of.items()
                 )
                 delta.replace(table, "aliases", [rows[key] for key in changed], predicate)
             return changed
 
     return with_retry(attempt) if rows else ()
+
+
+def _in_place_of(alias: str) -> tuple[str, ...]:
+    """Return the aliases whose rows go where one is given a set."""
+    return (alias, WITHDRAWN) if alias == CURRENT else (alias,)
 
 
 def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
@@ -145,7 +153,7 @@ def _require_name(alias: str) -> None:
 
 
 def withdraw(warehouse: Warehouse, vessel: str) -> bool:
-    """Let ``current`` of a vessel point to nothing.
+    """Let ``current`` of a vessel point to nothing; which set it was stays known as ``withdrawn``.
 
     Returns
     -------
@@ -156,9 +164,11 @@ def withdraw(warehouse: Warehouse, vessel: str) -> bool:
 
     def attempt() -> bool:
         with delta.ensured(warehouse, "aliases") as table:
-            if delta.rows(table, "aliases", {"vessel_key": key, "alias": CURRENT}).height == 0:
+            known = delta.rows(table, "aliases", {"vessel_key": key, "alias": CURRENT}).rows(named=True)
+            if not known:
                 return False
-            delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(CURRENT)}")
+            both = f"vessel_key = {quoted(key)} AND {one_of('alias', (CURRENT, WITHDRAWN))}"
+            delta.replace(table, "aliases", [{**row, "alias": WITHDRAWN} for row in known], both)
             return True
 
     return with_retry(attempt)

@@ -28,6 +28,14 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     alias = aliases.CURRENT if name is None else name
     if alias in pointed:
         return parameter_sets.get(warehouse, pointed[alias], vessel), alias
+    if name is None and aliases.WITHDRAWN in pointed:
+        raise NotFound(
+            "no_parameter_set",
+            f"No parameter set of {vessel!r} is current: what {pointed[aliases.WITHDRAWN]} rests on was corrected or "
+            "removed.",
+            f"Bring its model up to date with `kempf reprocess --vessel {vessel!r}`.",
+            {"vessel": vessel, "withdrawn": pointed[aliases.WITHDRAWN]},
+        )
     if name is None:
         raise NotFound(
             "no_parameter_set",

@@ -62,6 +62,9 @@ class Waiting:
             Whether it may leave another model.
         """
         standing = self.standing()
+        if standing is None and not adopt:
+            # the model of a set that was withdrawn is brought up to date, and is current then
+            standing = self.standing(aliases.WITHDRAWN)
         if standing is None:
             return True
         now = ModelSpec.model_validate(dict(standing.model_spec))

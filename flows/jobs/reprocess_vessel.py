@@ -19,7 +19,7 @@ from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, refresh_all, stale_logs
 from kempf.flows.jobs.rerun_set import rerun_alone
-from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing
+from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing_or_withdrawn
 from kempf.flows.jobs.update_model import store_up_to_date
 from kempf.flows.jobs.vessel_quality import quality_of
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all, remember_history
@@ -237,9 +237,9 @@ class _Reprocessing:
         work.report.findings = [finding.show() for finding in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
-        """Bring her current model with effects up to date; where that fails it stays as it was."""
+        """Bring her current model with effects up to date, or that withdrawn; where that fails it stays as it was."""
         try:
-            now = standing(self.warehouse, work.vessel)
+            now = standing_or_withdrawn(self.warehouse, work.vessel)
         except NotFound:
             # the set is lost: `_withdraw` says so
             return

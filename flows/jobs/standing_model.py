@@ -171,9 +171,18 @@ def require_current(warehouse: Warehouse, vessel: str, shown: str | None) -> str
 
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model, None where her current set is of no model of this kind."""
-    pointed = current_id(warehouse, vessel)
-    current = parameter_sets.get(warehouse, pointed, vessel) if pointed else None
-    return current if current is not None and current.estimator in (POOLED, WITH_EFFECTS) else None
+    return _model_at(warehouse, vessel, current_id(warehouse, vessel))
+
+
+def standing_or_withdrawn(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
+    """Return a vessel's current model or, where it was withdrawn and none came after it, that one; else None."""
+    pointed = aliases.of_vessel(warehouse, vessel)
+    return _model_at(warehouse, vessel, pointed.get(aliases.CURRENT) or pointed.get(aliases.WITHDRAWN))
+
+
+def _model_at(warehouse: Warehouse, vessel: str, name: str | None) -> ParameterSet | None:
+    stored = parameter_sets.get(warehouse, name, vessel) if name else None
+    return stored if stored is not None and stored.estimator in (POOLED, WITH_EFFECTS) else None
 
 
 def model_of(stored: ParameterSet) -> tuple[ModelSpec, Own]:

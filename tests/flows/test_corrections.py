@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 
 from kempf.flows.fleet.plan import plan
+from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.correct_segments import plan_for, plan_new
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import identify_vessel
@@ -17,11 +18,13 @@ from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.remove_logs import rename_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.standing_model import model_of, standing
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, examinations, history, logs, notes, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
+from tests.late import VESSEL
 from tests.workbench.driving import kempf
 
 SECOND_NS = 1_000_000_000
@@ -53,7 +56,11 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     assert segments.current(warehouse, "mariner") == []
     (kept,) = (one for one in segments.found_in(warehouse, "mariner") if one.is_zigzag)
     assert (kept.segment_id, kept.excluded) == (zigzag.segment_id, "the engine was slowed down")
-    assert history.standing(warehouse, "mariner") == [] and aliases.of_vessel(warehouse, "mariner") == {}
+    assert history.standing(warehouse, "mariner") == []
+    assert set(aliases.of_vessel(warehouse, "mariner")) == {aliases.WITHDRAWN}
+    with pytest.raises(NotFound, match="was corrected or removed") as none:
+        chosen_set(warehouse, "mariner", None)
+    assert "kempf reprocess" in none.value.next_step
     assert plan(warehouse, None, changed_only=True).due
     with pytest.raises(UsageError, match="excluded already"):
         plan_for(warehouse, zigzag.segment_id, "exclude", "again")
@@ -65,6 +72,22 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     reprocess_vessel(warehouse, "mariner")
     assert history.standing(warehouse, "mariner") == before
     assert [one.correction.action for one in corrections.all_of(warehouse)] == ["exclude", "accept"]
+
+
+def test_a_model_keeps_its_effects_without_a_manoeuvre_and_with_it_again(late_added: Path, tmp_path: Path) -> None:
+    warehouse = Warehouse(str(copytree(late_added / "w", tmp_path / "w")))
+    whole = aliases.of_vessel(warehouse, VESSEL)[aliases.CURRENT]
+    left_out = segments.current(warehouse, VESSEL)[0]
+    plan_for(warehouse, left_out.segment_id, "exclude", "tugs alongside").store(warehouse)
+    assert aliases.of_vessel(warehouse, VESSEL) == {aliases.WITHDRAWN: whole}
+    reprocess_vessel(warehouse, VESSEL)
+    without = standing(warehouse, VESSEL)
+    assert without is not None and model_of(without)[0].effects == ("rudder_lag",)
+    assert left_out.segment_id not in without.segment_ids
+    assert aliases.of_vessel(warehouse, VESSEL) == {aliases.CURRENT: without.parameter_set_id}
+    plan_for(warehouse, left_out.segment_id, "accept", "they had let go").store(warehouse)
+    reprocess_vessel(warehouse, VESSEL)
+    assert aliases.of_vessel(warehouse, VESSEL) == {aliases.CURRENT: whole}, "the very set of before"
 
 
 def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse: Warehouse, _filled: Path) -> None:
@@ -152,7 +175,8 @@ def test_a_correction_that_was_interrupted_is_finished_by_the_same_command(
         with pytest.raises(KeyboardInterrupt):
             plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell").store(warehouse)
     plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell").store(warehouse)
-    assert segments.current(warehouse, "mariner") == [] and aliases.of_vessel(warehouse, "mariner") == {}
+    assert segments.current(warehouse, "mariner") == []
+    assert set(aliases.of_vessel(warehouse, "mariner")) == {aliases.WITHDRAWN}
     assert unsearched(warehouse, logs.current(warehouse)) == [] and len(corrections.all_of(warehouse)) == 1
     with pytest.raises(UsageError, match="excluded already"):
         plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell")
