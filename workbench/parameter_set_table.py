@@ -15,10 +15,16 @@ if TYPE_CHECKING:
 
 def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False) -> None:
     """Print a parameter set for a person: values with standard errors, noise levels, fit, the gravest warnings."""
+    every = (*parameter_set.parameters, *parameter_set.noise)
+    legs = _of_legs(parameter_set)
+    head = ["", "value", "std", *(["by legs", "std"] if legs else []), "unit"]
     rows = [
-        [p.name, number(p.value), number(p.std, 2), p.unit] for p in (*parameter_set.parameters, *parameter_set.noise)
+        [p.name, number(p.value), number(p.std, 2), *(legs.get(p.name, ["", ""]) if legs else []), p.unit]
+        for p in every
     ]
-    print_table(["", "value", "std", "unit"], rows, title)
+    print_table(head, rows, title)
+    if legs:
+        click.echo("  by legs: fitted to predict one leg ahead; predictions of manoeuvres take these")
     converged = parameter_set.convergence.get("converged")
     reason = parameter_set.convergence.get("reason")
     click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}" + (f": {reason}" if reason else ""))
@@ -28,3 +34,22 @@ def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False) 
             f"{100 * fit['inside_95_percent']:.0f} % inside the 95 % interval"
         )
     show_warnings(parameter_set.warnings, verbose=verbose)
+
+
+def _of_legs(parameter_set: ParameterSet) -> dict[str, list[str]]:
+    """Return value and standard error of each parameter fitted to legs, empty where predictions take no such ones."""
+    ahead = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    if not ahead:
+        return {}
+    import numpy as np
+
+    from kempf.flows.jobs.leg_fit import fitted_to_legs
+
+    fitted = fitted_to_legs(parameter_set)
+    if fitted is None:
+        return {}
+    hull, effects, covariance, factor = fitted
+    stds = factor * np.sqrt(np.diag(covariance))
+    values = [float(x) for x in (*hull, *effects)]
+    names = [p.name for p in parameter_set.parameters if p.name in ahead["parameters"]]
+    return {name: [number(x), number(float(std), 2)] for name, x, std in zip(names, values, stds, strict=True)}

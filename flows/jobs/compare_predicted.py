@@ -87,6 +87,18 @@ def measured_beside(
     return tuple(beside(predicted, sailed) for sailed in every)
 
 
+def other_orders(warehouse: Warehouse, predicted: Predicted) -> dict[str, int]:
+    """Return how many manoeuvres of the same kind `measured_beside` leaves out, by the option that predicts them."""
+    manoeuvre = predicted.prediction.manoeuvre
+    counts: dict[str, int] = {}
+    for segment in segments.every(warehouse, predicted.vessel):
+        if segment.kind == _KINDS[type(manoeuvre)] and not _same_order(segment, manoeuvre):
+            angles = f"--angles {segment.psi0_deg:g}/{segment.delta0_deg:g}"
+            option = angles if isinstance(manoeuvre, Zigzag) else f"--rudder {segment.delta0_deg:g}"
+            counts[option] = counts.get(option, 0) + 1
+    return dict(sorted(counts.items()))
+
+
 def own_zigzags(warehouse: Warehouse, predicted: Predicted, progress: Progress = silent) -> list[AsSailed]:
     """Return all zigzags of the vessel, whatever their angles, with their first two overshoots."""
     every = [s for s in segments.current(warehouse, predicted.vessel) if s.kind == "zigzag"]

@@ -93,7 +93,9 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
     """Return what a prediction takes for granted, sentences."""
     sentences = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
-        sentences.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
+        sentences.append(
+            f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres that were sailed"
+        )
     rate = request.rudder_rate or basis.rudder_rate
     if request.rudder_rate is not None:
         sentences.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")

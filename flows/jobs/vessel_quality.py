@@ -53,7 +53,8 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
 
 
 def _of_logs(warehouse: Warehouse, vessel: str, manoeuvres: Iterable[segments.Segment]) -> Iterable[Finding]:
-    fitted = {manoeuvre.ingest_id for manoeuvre in manoeuvres if manoeuvre.is_fitted}
+    # a circle or a spiral is not fitted and is not for nothing: models are held against it
+    with_manoeuvres = {manoeuvre.ingest_id for manoeuvre in manoeuvres}
     rows = logs.current(warehouse, vessel)
     by_ingest = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
     for row in rows:
@@ -62,14 +63,16 @@ def _of_logs(warehouse: Warehouse, vessel: str, manoeuvres: Iterable[segments.Se
             yield from (
                 Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in examination.findings[:1]
             )
-        if row.ingest_id in fitted:
+        if row.ingest_id in with_manoeuvres:
             continue
         missing = [note for note in (examination.notes if examination else ()) if "cannot be looked for" in note]
         if missing:
             yield Finding("missing_channels", row.log_id, f"{row.file_name}: {missing[0]}.")
         else:
             yield Finding(
-                "no_zigzag", row.log_id, f"{row.file_name}: neither a zigzag nor a random manoeuvre was found."
+                "no_zigzag",
+                row.log_id,
+                f"{row.file_name}: no manoeuvre was found, neither one to fit nor one to hold a model against.",
             )
 
 

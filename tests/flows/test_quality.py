@@ -18,7 +18,7 @@ from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.vessel_quality import marks, quality_of
 from kempf.schemas.errors import UsageError
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Limits, Quality
-from kempf.warehouse import parameter_sets, segments
+from kempf.warehouse import logs, parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
@@ -56,10 +56,20 @@ def spoilt(warehouse: Warehouse, change: Callable[[ParameterSet], ParameterSet])
     return changed
 
 
+def test_a_log_of_a_turning_circle_alone_is_no_finding(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    (zigzag,) = segments.current(warehouse, "mariner")
+    (voyage,) = (log for log in logs.current(warehouse, "mariner") if log.file_name == "voyage.nmea")
+    circle = replace(zigzag, kind="turning_circle", ingest_id=voyage.ingest_id, log_id=voyage.log_id)
+    monkeypatch.setattr(segments, "found_in", lambda *_: [zigzag, circle])
+    assert {finding.kind for finding in quality_of(warehouse, "mariner")} == {"missing_channels"}
+
+
 def test_logs_and_sets_are_judged(warehouse: Warehouse) -> None:
     kinds = {one.kind: one for one in quality_of(warehouse, "mariner")}
     assert set(kinds) == {"no_zigzag", "missing_channels"}
-    assert kinds["no_zigzag"].words == "voyage.nmea: neither a zigzag nor a random manoeuvre was found."
+    assert kinds["no_zigzag"].words == (
+        "voyage.nmea: no manoeuvre was found, neither one to fit nor one to hold a model against."
+    )
     assert kinds["missing_channels"].words.startswith("no_rudder.nmea: no rudder_angle in this log")
     (zigzag,) = segments.current(warehouse, "mariner")
     assert marks(warehouse) == {}

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
-from kempf.warehouse import delta
+from kempf.warehouse import delta, parameter_sets
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.parameter_set_table import tell_set
 from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, one_of, refused, sets
 
@@ -37,6 +41,24 @@ def test_identify_for_a_person(own: Path):
     assert output.code == 0
     assert all(f"\n{name} " in output.out for name in HULL)
     assert "converged" in output.out and "next: kempf history" in output.out
+
+
+def test_what_predictions_take_is_shown_beside_what_the_likelihood_says(
+    filled: Path, capsys: pytest.CaptureFixture[str]
+):
+    stored = parameter_sets.get(Warehouse(str(filled)), one_of(filled, "ml"))
+    tell_set(stored, "a set")
+    assert "by legs" not in capsys.readouterr().out
+    ahead = {
+        "parameters": {name: {"value": 1.25 + k} for k, name in enumerate(HULL)},
+        "covariance": np.diag(np.arange(1.0, 7.0) ** 2).tolist(),
+        "better_than_one_step": {"falls_by": 0.5},
+        **{"fitted_misfit": 1.0, "left_out_misfit": 4.0},  # errors are twice as wide
+    }
+    tell_set(replace(stored, fit={"rung": {"one_leg_ahead": ahead}}), "a set")
+    shown = capsys.readouterr().out
+    assert re.search(r"^a12 +\S+ +\S+ +2\.25 +4 ", shown, re.MULTILINE), shown
+    assert "predictions of manoeuvres take these" in shown
 
 
 def test_identify_with_a_model_of_its_own(own: Path, tmp_path: Path):

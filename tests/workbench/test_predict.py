@@ -94,7 +94,9 @@ def test_overshoots_are_a_list_and_lie_beside_the_measured_ones(warehouse: Path)
     assert first["measured"] == pytest.approx(first["value"], abs=4.0)
     table = predicted(warehouse, "zigzag", "--compare").out
     assert "measured, and predicted with its own approach speed" in table
+    assert "not compared" not in table
     none = predicted(warehouse, "zigzag", "--angles", "5/5", "--compare").out
+    assert "not compared, as they are of other angles: 1 with --angles 20/20" in " ".join(none.split())
     assert "no manoeuvre of this kind" in none
 
 

@@ -73,7 +73,7 @@ def command(
     data as well. What is beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
     from kempf.flows.jobs.checked_prediction import predict_checked
-    from kempf.flows.jobs.compare_predicted import measured_beside
+    from kempf.flows.jobs.compare_predicted import measured_beside, other_orders
     from kempf.flows.jobs.predict_request import PredictRequest
     from kempf.warehouse.store import Warehouse
 
@@ -96,6 +96,10 @@ def command(
         _print_predicted(predicted, figure)
         if measured is not None:
             _print_measured(measured)
+            others = other_orders(Warehouse(uri), predicted)
+            if others:
+                by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
+                print_paragraph(f"not compared, as they are of other angles: {by_option}")
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:
