@@ -13,10 +13,16 @@ if TYPE_CHECKING:
     from kempf.warehouse.parameter_set import ParameterSet
 
 
-def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False) -> None:
-    """Print a parameter set for a person: values with standard errors, noise levels, fit, the gravest warnings."""
+def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False, legs_too: bool = False) -> None:
+    """Print a parameter set for a person: values with standard errors, noise levels, fit, the gravest warnings.
+
+    Parameters
+    ----------
+    legs_too : bool, optional
+        Whether parameters fitted to legs, where predictions take these, stand beside those of the likelihood.
+    """
     every = (*parameter_set.parameters, *parameter_set.noise)
-    legs = _of_legs(parameter_set)
+    legs = _of_legs(parameter_set) if legs_too else {}
     head = ["", "value", "std", *(["by legs", "std"] if legs else []), "unit"]
     rows = [
         [p.name, number(p.value), number(p.std, 2), *(legs.get(p.name, ["", ""]) if legs else []), p.unit]

@@ -76,7 +76,7 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
         f"{parameter_set.parameter_set_id}: {parameter_set.vessel}, model {parameter_set.model_name}, "
         f"estimator {parameter_set.estimator}"
     )
-    tell_set(parameter_set, title, verbose=verbose)
+    tell_set(parameter_set, title, verbose=verbose, legs_too=True)
     print_table(
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in parameter_set.discrete],
