@@ -82,7 +82,7 @@ def test_the_wheel_holds_kempf_and_nothing_else(wheel: Path) -> None:
         for path in (ROOT / layer).rglob("*")
         if path.is_file() and "__pycache__" not in path.parts
     }
-    assert inside == {"kempf/__init__.py", "kempf/py.typed", *source}
+    assert inside == {"kempf/__init__.py", "kempf/__main__.py", "kempf/py.typed", *source}
 
 
 def test_the_wheel_works_where_no_checkout_is(python: Path, mariner: Ship, tmp_path: Path) -> None:
