@@ -62,7 +62,7 @@ def test_current_is_withdrawn_where_its_set_no_longer_stands(ferry) -> None:
     vessels.register(warehouse, "ferry", profile.model_copy(update={"sources": blind}))
     report = reprocess_vessel(warehouse, "ferry")
     assert (report.segments, report.withdrawn) == (0, outcome.parameter_set.parameter_set_id)
-    assert aliases.of_vessel(warehouse, "ferry") == {}
+    assert aliases.of_vessel(warehouse, "ferry") == {aliases.WITHDRAWN: report.withdrawn}
     assert reprocess_vessel(warehouse, "ferry").withdrawn is None
 
 
