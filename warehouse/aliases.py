@@ -167,7 +167,7 @@ def withdraw(warehouse: Warehouse, vessel: str) -> bool:
             known = delta.rows(table, "aliases", {"vessel_key": key, "alias": CURRENT}).rows(named=True)
             if not known:
                 return False
-            both = f"vessel_key = {quoted(key)} AND {one_of('alias', (CURRENT, WITHDRAWN))}"
+            both = f"vessel_key = {quoted(key)} AND {one_of('alias', _in_place_of(CURRENT))}"
             delta.replace(table, "aliases", [{**row, "alias": WITHDRAWN} for row in known], both)
             return True
 

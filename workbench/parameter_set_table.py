@@ -44,18 +44,6 @@ def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False, 
 
 def _of_legs(parameter_set: ParameterSet) -> dict[str, list[str]]:
     """Return value and standard error of each parameter fitted to legs, empty where predictions take no such ones."""
-    ahead = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
-    if not ahead:
-        return {}
-    import numpy as np
+    from kempf.flows.jobs.leg_fit import by_name
 
-    from kempf.flows.jobs.leg_fit import fitted_to_legs
-
-    fitted = fitted_to_legs(parameter_set)
-    if fitted is None:
-        return {}
-    hull, effects, covariance, factor = fitted
-    stds = factor * np.sqrt(np.diag(covariance))
-    values = [float(x) for x in (*hull, *effects)]
-    names = [p.name for p in parameter_set.parameters if p.name in ahead["parameters"]]
-    return {name: [number(x), number(float(std), 2)] for name, x, std in zip(names, values, stds, strict=True)}
+    return {name: [number(value), number(std, 2)] for name, (value, std) in by_name(parameter_set).items()}

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
@@ -15,13 +18,33 @@ def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, fl
     left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
     "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
     """
-    ahead = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    ahead = _ahead(parameter_set)
     if ahead is None or ahead["better_than_one_step"] is None:
         return None
     # by name, as JSON keeps no order; the covariance is in that of the set
-    names = [p.name for p in parameter_set.parameters if p.name in ahead["parameters"]]
-    values = np.array([ahead["parameters"][name]["value"] for name in names], dtype=np.float64)
+    values = np.array([ahead["parameters"][name]["value"] for name in _names(parameter_set, ahead)], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
     fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
     factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
     return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
+
+
+def by_name(parameter_set: ParameterSet) -> dict[str, tuple[float, float]]:
+    """Return value and standard error of what `fitted_to_legs` gives, by parameter; empty where that is None."""
+    ahead, fitted = _ahead(parameter_set), fitted_to_legs(parameter_set)
+    if ahead is None or fitted is None:
+        return {}
+    hull, effects, covariance, factor = fitted
+    stds = factor * np.sqrt(np.diag(covariance))
+    pairs = zip((*hull.tolist(), *effects.tolist()), stds.tolist(), strict=True)
+    return dict(zip(_names(parameter_set, ahead), pairs, strict=True))
+
+
+def _ahead(parameter_set: ParameterSet) -> Mapping[str, Any] | None:
+    ahead: Mapping[str, Any] | None = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    return ahead
+
+
+def _names(parameter_set: ParameterSet, ahead: Mapping[str, Any]) -> list[str]:
+    """Return the parameters of the ship that a fit to legs has, in the order of the set."""
+    return [p.name for p in parameter_set.parameters if p.name in ahead["parameters"]]

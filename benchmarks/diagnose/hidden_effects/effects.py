@@ -77,7 +77,7 @@ def scales(hull: SimulatedHull) -> dict[str, float]:
 
 
 def theta(effect: HiddenEffect | None, c: float, hull: SimulatedHull) -> Float:
-    """Return the strengths that the kernels of `benchmarks.diagnose.hidden_effects.plant` take, shape (47,).
+    """Return the strengths that the kernels of `benchmarks.diagnose.hidden_effects.plant` take, shape (N_THETA,).
 
     Parameters
     ----------
