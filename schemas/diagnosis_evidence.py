@@ -69,8 +69,10 @@ class FittedModel(_Part):
     #: Title of the effect that the model before lacks; empty for the first.
     added: str
     parameters: tuple[FittedParameter, ...]
+    #: Those fitted to legs, where predictions with the last model take these; empty elsewhere.
+    leg_parameters: tuple[FittedParameter, ...]
     #: fitted_errors, held_out_errors: Shape (runs,). Relative free-run error of each fitted and each held-out
-    #: manoeuvre.
+    #: manoeuvre, with ``leg_parameters`` where there are such.
     fitted_errors: Curve
     held_out_errors: Curve
     #: fitted_error, held_out_error: Their means; NaN where there is none, or a free run diverges.
@@ -237,8 +239,10 @@ class MisfitPlaces(_Part):
 class DiagnosisEvidence(_Part):
     """All that a report shows of a diagnosis beyond its verdict."""
 
-    #: The diagnosed model first.
+    #: The plain model first.
     models: tuple[FittedModel, ...]
+    #: How many of them come before the diagnosed one: it has their effects and one more.
+    given: int
     #: By the effect's name.
     candidates: dict[str, CandidateEffect]
     confusion: ConfusionMap
@@ -258,8 +262,23 @@ class DiagnosisEvidence(_Part):
 
     @property
     def improved(self) -> bool:
-        """Whether an effect was added to the first model."""
+        """Whether the last model has more effects than the first."""
         return len(self.models) > 1
+
+    @property
+    def found(self) -> bool:
+        """Whether the diagnosis added an effect."""
+        return len(self.models) > self.given + 1
+
+    @property
+    def diagnosed(self) -> FittedModel:
+        """The model that the diagnosis began from."""
+        return self.models[self.given]
+
+    @property
+    def by_legs(self) -> bool:
+        """Whether the free runs are with parameters fitted to legs."""
+        return any(model.leg_parameters for model in self.models)
 
 
 def evidence_from_json(text: str) -> DiagnosisEvidence | None:

@@ -28,7 +28,7 @@ _PACKAGE, _SIMULATOR = "kempf", "pipeline.simulate"
 #: A module that imports one of these opens files beside it by name: all that lie in its folder count with it.
 _BY_NAME = ("importlib", "pkgutil")
 #: Of what is kept: the way in which a tree is written down, and how many files of which no more is asked may stay.
-_FORM, _MOST_KEPT = 2, 4000
+_FORM, _MOST_KEPT = 3, 4000
 
 
 @dataclass(frozen=True)
@@ -58,16 +58,18 @@ def read_module(content: bytes) -> Module:
 
 
 def read_yaml(content: bytes, left_out: Collection[str] = ()) -> str:
-    """Return the digest of what a YAML file says; of its bytes where it is not valid YAML.
+    """Return the digest of what a YAML file says, in its order; of its bytes where it is not valid YAML.
+
+    The order counts: that of an effect's parameters is the one of a set and of its covariance.
 
     Parameters
     ----------
     left_out : collection of str
         Keys that do not count, however deep they stand.
     """
-    with suppress(yaml_text.NotYaml, TypeError):  # keys of different types are not sorted
+    with suppress(yaml_text.NotYaml, TypeError):  # a key that is no text, number or truth value
         said = _without(yaml_text.load(content), left_out)
-        content = json.dumps(said, sort_keys=True, default=repr).encode()
+        content = json.dumps(said, default=repr).encode()
     return sha256(content).hexdigest()
 
 

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.shooting.inflation import inflation
 from kempf.warehouse.parameter_set import ParameterSet
 
 
 def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, float] | None:
     """Return hull, effects, covariance and its factor of the fit one leg ahead.
 
-    None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
-    left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
-    "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
+    None where that a step ahead predicts as well. The factor is `kempf.pipeline.shooting.inflation.inflation`.
     """
     ahead = _ahead(parameter_set)
     if ahead is None or ahead["better_than_one_step"] is None:
@@ -24,8 +23,7 @@ def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, fl
     # by name, as JSON keeps no order; the covariance is in that of the set
     values = np.array([ahead["parameters"][name]["value"] for name in _names(parameter_set, ahead)], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
-    fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
-    factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
+    factor = inflation(ahead.get("fitted_misfit"), ahead.get("left_out_misfit"))
     return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
 
 

@@ -156,7 +156,8 @@ def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
     """Return the ladder without what was taken for the effect that was added last, where that alone does as well.
 
     Beside what it was taken for the true effect finds little left; the wrong one keeps a size of several standard
-    errors, for the likelihood bends. So the question is what the last effect does without it.
+    errors, for the likelihood bends. So the question is what the last effect does without it. Where predictions chose
+    the wrong one, and the last one predicts alike in its place, it stands there as if chosen so: they spoke for both.
     """
     last = steps[-1]
     assert last.added is not None
@@ -166,11 +167,23 @@ def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
         first, second = beside.get(step.added.name), beside.get(last.added.name)
         if first is None or second is None or not alike(first, second) > ALIKE:
             continue
-        without = ladder.without(step.added, steps)
+        by_prediction = step.stability is not None
+        if by_prediction and last.predicts_by_legs and last.added.polynomial and not step.added.polynomial:
+            # a term of a series goes wrong beyond the logs first, and of a model that lacks something the likelihood
+            # does not choose the form
+            continue
+        in_place = by_prediction and _predicts_alike(ladder, below, step, last.added)
+        without = ladder.in_place(step, steps) if in_place else ladder.without(step.added, steps)
         gained = 2.0 * (last.fit.log_likelihood - without[-1].fit.log_likelihood)
         if gained - price_of(step.added, last.fit) < BIC_SAVING and not _worse(last.ahead, without[-1].ahead):
             return without
     return steps
+
+
+def _predicts_alike(ladder: Ladder, below: Step, step: Step, effect: Effect) -> bool:
+    """Return whether an effect in the place of the one of a step predicts legs alike."""
+    ahead = ladder.ahead(below, effect)
+    return step.ahead is not None and ahead is not None and not worsens(step.ahead, ahead)
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:

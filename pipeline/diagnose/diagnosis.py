@@ -20,7 +20,7 @@ from kempf.pipeline.diagnose.by_prediction import predicting_better
 from kempf.pipeline.diagnose.final_sizes import Size, final_sizes
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Ladder
-from kempf.pipeline.diagnose.ladder_step import Step, make_step
+from kempf.pipeline.diagnose.ladder_step import Step, make_step, step_of
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.remaining_misfit import RemainingMisfit, remaining_misfit
 from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_reference_of
@@ -43,6 +43,8 @@ class Diagnosis:
 
     #: The plain model, then with one given effect more after the other; the last one is diagnosed.
     way: tuple[PooledFit, ...]
+    #: The same but the diagnosed one, as rungs; empty where that is plain.
+    given: tuple[Step, ...]
     #: The diagnosed model first; the effects of the others are claimed.
     steps: tuple[Step, ...]
     #: By name, how large the effects of ``steps`` are in the last of these; and what else is in their sets, in place of
@@ -104,6 +106,7 @@ def diagnose(
         shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
     listener.begins(f"screening {len(effects)} effects")
     screened = screen(base, effects, workers, listener)
+    rungs = tuple(step_of(fit, held, _begun(shooting, fit), workers) for fit in fits[:-1])
     first = make_step(base, None, (), (), held, screened, workers, _begun(shooting, base))
     before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
     ladder = Ladder(shooting, effects, held, workers, settings, listener, base)
@@ -121,6 +124,7 @@ def diagnose(
     sizes = final_sizes(steps[:kept], workers, listener)
     return Diagnosis(
         way=tuple(fits),
+        given=rungs,
         steps=tuple(steps[:kept]),
         sizes=sizes,
         imitating=tuple(steps[kept:]),

@@ -16,9 +16,12 @@ from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag, manoeuvre_evidence
 from kempf.pipeline.diagnose.misfit import misfit_of
 from kempf.pipeline.diagnose.unmodelled_acceleration import unmodelled_acceleration
-from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.diagnose.unsure_instants import with_instants
+from kempf.pipeline.estimate.agreement import Agreement, agreement_of
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.run_residuals import PhaseInterval
 from kempf.pipeline.predict.smoothed_states import smoothed_states
+from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.diagnosis_evidence import (
     CandidateEffect,
     ConfusionMap,
@@ -29,6 +32,7 @@ from kempf.schemas.diagnosis_evidence import (
     ManoeuvreEvidence,
     MisfitPlaces,
 )
+from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import HULL_PARAMETERS
 
 #: effects in the confusion map
@@ -60,7 +64,10 @@ def evidence_of(
     workers : Executor
         Manoeuvres share it; nothing depends on it.
     """
-    first, last = diagnosis.steps[0], diagnosis.steps[-1]
+    steps = (*diagnosis.given, *diagnosis.steps)
+    first, last = steps[0], steps[-1]
+    # of all models where predictions with the last one take these, so that they compare
+    by_legs = last.predicts_by_legs
     before = _Judged(first, diagnosis, phases, workers.map)
     after = before if last is first else _Judged(last, diagnosis, phases, workers.map)
     held = {run.name for run in diagnosis.held}
@@ -75,9 +82,10 @@ def evidence_of(
         workers.map(shown, range(len(before.all))), key=lambda manoeuvre: (manoeuvre.start_utc_ns, manoeuvre.segment_id)
     )
     return DiagnosisEvidence(
-        models=tuple(_model(step, first) for step in diagnosis.steps),
+        models=tuple(_model(step, first, diagnosis, workers, by_legs=by_legs) for step in steps),
+        given=len(diagnosis.given),
         candidates=_candidates(diagnosis),
-        confusion=_confusion(first),
+        confusion=_confusion(diagnosis.steps[0]),
         added_variables=added_variables(diagnosis),
         unmodelled_before=unmodelled_acceleration(before.runs, before.states),
         unmodelled_after=None if after is before else unmodelled_acceleration(after.runs, after.states),
@@ -100,35 +108,43 @@ class _Judged:
         phases: Mapping[str, Sequence[PhaseInterval]],
         each: Callable[[Callable[[JudgedRun], Float], Sequence[JudgedRun]], Iterable[Float]],
     ) -> None:
-        self.fitted = judged_fitted(step, phases)
-        self.held_out = judged_held_out(step, diagnosis.held, phases)
+        by_legs = diagnosis.steps[-1].predicts_by_legs
+        self.fitted = judged_fitted(step, phases, by_legs=by_legs)
+        self.held_out = judged_held_out(step, diagnosis.held, phases, by_legs=by_legs)
         self.all = (*self.fitted, *self.held_out)
         self.runs = tuple(judged.residuals.filtered.run for judged in self.all)
         self.states = tuple(
-            each(lambda run: smoothed_states(run.residuals.filtered, run.point, run.residuals.free), self.all)
+            each(lambda run: smoothed_states(run.residuals.filtered, run.point, run.one_step_free), self.all)
         )
 
 
-def _fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
-    """Return the parameters of hull and effects with their standard errors."""
-    ship = fit.ship
-    names = [*HULL_PARAMETERS, *ship.model.names]
-    units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in ship.model.parameters)]
+def _fitted_parameters(step: Step, plain: Agreement, workers: Executor) -> tuple[FittedParameter, ...]:
+    """Return the parameters of hull and effects with their standard errors, as a parameter set states them."""
+    stated = with_instants(step.fit, workers)
+    agreement = agreement_of(stated.fit) if step.fit.ship.model.effects else plain
+    ship = stated.fit.ship_part(agreement.widened**2 * stated.fit.covariance + stated.covariance)
+    return _parameters(ship.model, ship.parameters, ship.std)
+
+
+def _parameters(model: EffectModel, values: Float, std: Float) -> tuple[FittedParameter, ...]:
+    names = [*HULL_PARAMETERS, *model.names]
+    units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in model.parameters)]
     return tuple(
-        FittedParameter(name=name, unit=unit, value=float(value), std=float(std))
-        for name, unit, value, std in zip(names, units, ship.parameters, ship.std, strict=True)
+        FittedParameter(name=name, unit=unit, value=float(value), std=float(error))
+        for name, unit, value, error in zip(names, units, values, std, strict=True)
     )
 
 
-def _model(step: Step, first: Step) -> FittedModel:
+def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, by_legs: bool) -> FittedModel:
     used = np.any([filtered.levels_used()[:3] for filtered in step.fit.runs], axis=0)
     intensities = zip(_DISTURBANCES, step.intensities, first.intensities, used, strict=True)
-    fitted = np.array([run.relative_error for run in step.fitted])
-    held_out = np.array([run.relative_error for run in step.held])
+    fitted, held_out = (np.array([run.relative_error for run in runs]) for runs in step.free_runs(by_legs=by_legs))
     return FittedModel(
         effects=tuple(effect.title for effect in step.fit.model.ship.effects),
-        added="" if step is first or step.added is None else step.added.title,
-        parameters=_fitted_parameters(step.fit),
+        # the diagnosed model is no step of the search, but as a rung it has one effect more than the one below
+        added="" if step is first else (step.added or step.fit.model.ship.effects[-1]).title,
+        parameters=_fitted_parameters(step, diagnosis.plain.agreement, workers),
+        leg_parameters=_leg_parameters(step.ahead) if by_legs and step.ahead is not None else (),
         fitted_errors=fitted,
         held_out_errors=held_out,
         fitted_error=float(np.mean(fitted)),
@@ -143,12 +159,16 @@ def _model(step: Step, first: Step) -> FittedModel:
     )
 
 
+def _leg_parameters(ahead: Ahead) -> tuple[FittedParameter, ...]:
+    """Return the parameters fitted to legs."""
+    return _parameters(ahead.model, ahead.fit.shared, ahead.std)
+
+
 def _candidates(diagnosis: Diagnosis) -> dict[str, CandidateEffect]:
     refitted: dict[str, tuple[str, tuple[FittedParameter, ...]]] = {}
     for number, step in enumerate(diagnosis.steps[1:], start=1):
-        for candidate, confirmation in step.chosen_from:
-            last = _fitted_parameters(confirmation.fit)[-len(candidate.effect.parameters) :]
-            refitted[candidate.effect.name] = (f"S{number}", last)
+        for candidate, _ in step.chosen_from:
+            refitted[candidate.effect.name] = (f"S{number}", _sized(candidate.effect, diagnosis))
     candidates = {}
     for candidate in diagnosis.steps[0].screened:
         set_id, parameters = refitted.get(candidate.effect.name, ("", ()))
@@ -159,6 +179,15 @@ def _candidates(diagnosis: Diagnosis) -> dict[str, CandidateEffect]:
             refitted=parameters,
         )
     return candidates
+
+
+def _sized(effect: Effect, diagnosis: Diagnosis) -> tuple[FittedParameter, ...]:
+    """Return the parameters of an effect with their standard errors, beside everything else that is claimed."""
+    size = diagnosis.sizes[effect.name]
+    return tuple(
+        FittedParameter(name=f"{effect.name}.{parameter.name}", unit=parameter.unit, value=float(value), std=float(std))
+        for parameter, value, std in zip(effect.parameters, size.values, size.std, strict=True)
+    )
 
 
 def _confusion(first: Step) -> ConfusionMap:

@@ -13,6 +13,7 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.levels import fit_levels
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 
 
@@ -23,8 +24,10 @@ class JudgedRun:
     #: Parameters of the model, with noise levels fitted to this manoeuvre, held out or not: a noisier sensor is no
     #: misfit.
     point: Point
-    #: One step ahead and in free run.
+    #: One step ahead by ``point``, and in free run by it or by the parameters fitted to legs.
     residuals: RunResiduals
+    #: The free run by ``point``.
+    one_step_free: FreeRun
 
     @property
     def settles(self) -> bool:
@@ -32,26 +35,31 @@ class JudgedRun:
         return bool(np.isfinite(self.residuals.passed.log_likelihood))
 
 
-def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]]) -> tuple[JudgedRun, ...]:
+def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]], *, by_legs: bool) -> tuple[JudgedRun, ...]:
     """Return the fitted manoeuvres under the model of a step.
 
     Parameters
     ----------
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
+    by_legs : bool
+        As `Step.free_runs`.
     """
     fit = step.fit
     return tuple(
         JudgedRun(
             Point(fit.hull, fit.values, levels),
-            RunResiduals(filtered, line.passed, free, tuple(phases.get(filtered.run.name, ()))),
+            RunResiduals(filtered, line.passed, predicting, tuple(phases.get(filtered.run.name, ()))),
+            free,
         )
-        for filtered, levels, line, free in zip(fit.runs, fit.levels, fit.linearised, step.fitted, strict=True)
+        for filtered, levels, line, predicting, free in zip(
+            fit.runs, fit.levels, fit.linearised, step.free_runs(by_legs=by_legs)[0], step.fitted, strict=True
+        )
     )
 
 
 def judged_held_out(
-    step: Step, held: Sequence[GridRun], phases: Mapping[str, Sequence[PhaseInterval]]
+    step: Step, held: Sequence[GridRun], phases: Mapping[str, Sequence[PhaseInterval]], *, by_legs: bool
 ) -> tuple[JudgedRun, ...]:
     """Return the held-out manoeuvres under the model of a step.
 
@@ -61,13 +69,16 @@ def judged_held_out(
         In the order of ``step.held``.
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
+    by_legs : bool
+        As `Step.free_runs`.
     """
     fit, judged = step.fit, []
     usual = np.mean(fit.levels, axis=0)
-    for run, free in zip(held, step.held, strict=True):
+    for run, predicting, free in zip(held, step.free_runs(by_legs=by_legs)[1], step.held, strict=True):
         filtered = RunFilter(run, fit.model, fit.runs[0].spec)
         levels = fit_levels(filtered, fit.hull, fit.values, usual).levels
         point = Point(fit.hull, fit.values, levels)
         passed = sensitivity.passed(filtered, point)
-        judged.append(JudgedRun(point, RunResiduals(filtered, passed, free, tuple(phases.get(run.name, ())))))
+        residuals = RunResiduals(filtered, passed, predicting, tuple(phases.get(run.name, ())))
+        judged.append(JudgedRun(point, residuals, free))
     return tuple(judged)

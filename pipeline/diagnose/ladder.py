@@ -87,15 +87,40 @@ class Ladder:
     def without(self, idle: Effect, steps: Sequence[Step]) -> list[Step]:
         """Climb the ladder again without an effect; what was refused on the way stays listed."""
         self.listener.begins(f"{idle.title} is no longer needed")
-        rungs = [steps[0]]
+        kept = [step for step in steps[1:] if step.added is not None and step.added.name != idle.name]
+        return self._climbed([steps[0]], kept, steps, idle)
+
+    def in_place(self, step: Step, steps: Sequence[Step]) -> list[Step]:
+        """Climb the ladder again with the last effect in the place of the one of a rung, which stays in its set.
+
+        Parameters
+        ----------
+        step : Step
+            One of ``steps``, chosen by predictions: what takes its place keeps its stability.
+        """
+        last = steps[-1].added
+        assert last is not None
+        assert step.added is not None
+        self.listener.begins(f"{last.title} in place of {step.added.title}")
+        at = next(number for number, rung in enumerate(steps) if rung is step)
+        below, kept = list(steps[:at]), [rung for rung in steps[at + 1 : -1] if rung.added is not None]
+        candidate = score(below[-1].fit, last, self.workers)
+        confirmation = self.confirmed(below[-1].fit, self.unseen(below[-1]), candidate)
+        others = tuple(pair for pair in step.chosen_from if pair[0].effect.name != last.name)
+        ahead = self.ahead(below[-1], last)
+        again = self.stepped(((candidate, confirmation), *others), step.refused, ahead, step.stability)
+        together = tuple(last.name if name == step.added.name else name for name in step.together)
+        return self._climbed([*below, replace(again, together=together)], kept, steps, step.added)
+
+    def _climbed(self, rungs: list[Step], kept: Sequence[Step], steps: Sequence[Step], gone: Effect) -> list[Step]:
+        """Put the effects of rungs on others once more."""
         refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
-        for step in steps[1:]:
-            if step.added is None or step.added.name == idle.name:
-                continue
+        for step in kept:
+            assert step.added is not None
             candidate = score(rungs[-1].fit, step.added, self.workers)
             confirmation = self.confirmed(rungs[-1].fit, self.unseen(rungs[-1]), candidate)
             others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
             ahead = self.ahead(rungs[-1], step.added)
             again = self.stepped(((candidate, confirmation),), others, ahead, step.stability)
-            rungs.append(replace(again, together=tuple(name for name in step.together if name != idle.name)))
+            rungs.append(replace(again, together=tuple(name for name in step.together if name != gone.name)))
         return rungs

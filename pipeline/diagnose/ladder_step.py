@@ -50,6 +50,22 @@ class Step:
     together: tuple[str, ...] = ()
 
     @property
+    def predicts_by_legs(self) -> bool:
+        """Whether predictions take the parameters fitted to legs: these predict them better than the likelihood's."""
+        return self.ahead is not None and self.ahead.disagrees is not None
+
+    def free_runs(self, *, by_legs: bool) -> tuple[tuple[FreeRun, ...], tuple[FreeRun, ...]]:
+        """Return the free runs of fitted and of held-out manoeuvres.
+
+        Parameters
+        ----------
+        by_legs : bool
+            Whether with the parameters fitted to legs, if there are such, and not with the likelihood's.
+        """
+        many = len(self.fitted)
+        return (self.by_legs[:many], self.by_legs[many:]) if by_legs and self.by_legs else (self.fitted, self.held)
+
+    @property
     def in_sample_error(self) -> float:
         """Mean relative error of the free runs of fitted manoeuvres."""
         return float(np.mean([run.relative_error for run in self.fitted]))
@@ -66,11 +82,11 @@ class Step:
         return result
 
 
-def step_of(fit: PooledFit, held: Sequence[GridRun], ahead: Ahead | None) -> Step:
+def step_of(fit: PooledFit, held: Sequence[GridRun], ahead: Ahead | None, workers: Executor | None = None) -> Step:
     """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
     effects = fit.model.ship.effects
     added = effects[-1] if effects else None
-    return make_step(fit, added, (), (), held, (), ahead=ahead)
+    return make_step(fit, added, (), (), held, (), workers, ahead)
 
 
 def make_step(

@@ -26,7 +26,11 @@ def where_left(diagnosis: Diagnosis, phases: Mapping[str, Sequence[PhaseInterval
         the model; None where the model runs away from every run.
     """
     step = diagnosis.steps[-1]
-    judged = judged_held_out(step, diagnosis.held, phases) if diagnosis.held else judged_fitted(step, phases)
+    by_legs = step.predicts_by_legs
+    if diagnosis.held:
+        judged = judged_held_out(step, diagnosis.held, phases, by_legs=by_legs)
+    else:
+        judged = judged_fitted(step, phases, by_legs=by_legs)
     places = misfit_of(judged)
     if not places:
         return None

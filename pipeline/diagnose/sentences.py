@@ -130,7 +130,7 @@ def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
     force = last.intensities[0] / first.intensities[0]
     disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
-    if last.ahead is not None and last.ahead.disagrees is not None:
+    if last.predicts_by_legs:
         return _fall_by_legs(first, last, disturbance)
     fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
     if a is None or b is None:
@@ -152,12 +152,11 @@ def _fall(first: Step, last: Step) -> str:
 
 def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
     """Say how the free runs change with the parameters that predictions take; medians, as some may run away."""
-    many = len(last.fitted)
-    samples = [("fitted", slice(None, many)), ("held-out", slice(many, None))]
+    before, after = first.free_runs(by_legs=True), last.free_runs(by_legs=True)
     falls = [
-        f"from {_median(first.by_legs[part])} to {_median(last.by_legs[part])} % of the motion in {name} manoeuvres"
-        for name, part in samples
-        if last.by_legs[part]
+        f"from {_median(a)} to {_median(b)} % of the motion in {name} manoeuvres"
+        for name, a, b in zip(("fitted", "held-out"), before, after, strict=True)
+        if b
     ]
     off = sum(not run.relative_error < 1.0 for run in last.by_legs)
     sentence = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"

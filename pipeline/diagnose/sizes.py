@@ -24,7 +24,7 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     if step.added is None or effect.name != step.added.name:
         return effect.title
     own = ahead.model.own(effect.name)
-    std = np.sqrt(np.maximum(np.diag(ahead.fit.covariance), 0.0))[-ahead.fit.values.size :]
+    std = ahead.std[-ahead.fit.values.size :]
     return f"{_with_size(effect, ahead.fit.values[own], std[own])}, fitted to legs"
 
 

@@ -1,4 +1,4 @@
-"""A predicted manoeuvre: figures with their intervals, from all ships that the data allow of all models alike."""
+"""A predicted manoeuvre: figures with their intervals, which hold those of every model that fits as well."""
 
 from __future__ import annotations
 
@@ -133,17 +133,21 @@ def predict(
 
 
 def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Figure]:
-    """Return the figures of a ship with the interval of all that were drawn from some models."""
-    samples = _samples(models)
+    """Return the figures of a ship, each with the interval from the lowest to the highest that one of the models has.
+
+    So it holds 95 % whichever of them is the ship. Percentiles of all their draws together would not: beside a model
+    that is surer they cut into the interval of the one that was asked for.
+    """
+    each = [_samples([model]) for model in models]
     figures = {}
-    for name, values in samples.items():
-        there = values[np.isfinite(values)]
+    for name, values in _samples(models).items():
+        there = [of_model[name][np.isfinite(of_model[name])] for of_model in each if name in of_model]
         value = sailed.figures[name] if sailed is not None else np.nan
-        if there.size < ENOUGH * values.size or not np.isfinite(value):
+        if sum(kept.size for kept in there) < ENOUGH * values.size or not np.isfinite(value):
             figures[name] = Figure(None, None, None)
         else:
-            low, high = np.percentile(there, [_TAIL, 100.0 - _TAIL])
-            figures[name] = Figure(float(value), float(low), float(high))
+            ends = np.array([np.percentile(kept, [_TAIL, 100.0 - _TAIL]) for kept in there if kept.size])
+            figures[name] = Figure(float(value), float(ends[:, 0].min()), float(ends[:, 1].max()))
     return figures
 
 

@@ -15,6 +15,7 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.terms.ordinary import driven_by_noise
 from kempf.pipeline.shooting import shooting_fit
+from kempf.pipeline.shooting.inflation import inflation
 from kempf.pipeline.shooting.left_out import LeftOut, left_out
 from kempf.pipeline.shooting.normal_equations import NormalEquations
 from kempf.pipeline.shooting.paired import Paired, paired
@@ -57,6 +58,12 @@ class Ahead:
             return None
         comparison = paired(self.one_step, self.own)
         return comparison if comparison.in_std > _DISAGREE and comparison.falls_by > _LEAST else None
+
+    @property
+    def std(self) -> Float:
+        """Standard errors of hull and effects, shape (6 + p,), with the factor of `inflation`."""
+        own: Float = np.sqrt(np.maximum(np.diag(self.fit.covariance), 0.0))
+        return inflation(self.own.mean, self.left_out.mean) * own
 
     @property
     def model(self) -> EffectModel:

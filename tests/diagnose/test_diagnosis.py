@@ -393,11 +393,14 @@ def test_an_effect_that_races_no_more_climbs_from_the_hull_at_hand(late: tuple[S
     assert climbs(race=False) == [len(base.runs)]
 
 
-def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("stability", [None, 1.0])
+def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(
+    stability: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def lag_first(ladder: Ladder, steps: list[Step]) -> list[Step]:
         (lag,) = (one for one in steps[0].screened if one.effect.name == "rudder_lag")
         made = ladder.confirmed(steps[0].fit, ladder.unseen(steps[0]), lag)
-        step = ladder.stepped(((lag, made),), (), ladder.ahead(steps[0], lag.effect), None)
+        step = ladder.stepped(((lag, made),), (), ladder.ahead(steps[0], lag.effect), stability)
         ladder.probe = step.fit
         return [*steps, step]
 
@@ -405,6 +408,11 @@ def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(monkeypatch:
     ship = sailed("dead_time", strength=1, seed=4)
     monkeypatch.setattr("kempf.pipeline.diagnose.diagnosis.predicting_better", lag_first)
     found = ship.diagnosis(("rudder_lag", "dead_time"))
-    assert [step.added.name for step in found.steps if step.added] == ["dead_time"]
+    (step,) = found.steps[1:]
+    assert step.added is not None and step.added.name == "dead_time"
+    # in the place of what predictions chose, which stays in the set: the claim is not lost with the name
+    assert step.stability == stability
+    others = [candidate.effect.name for candidate, _ in step.chosen_from[1:]]
+    assert ("rudder_lag" in others) is (stability is not None)
     tau, std = value_of(found, "dead_time.tau")
     assert abs(tau - ship.c) < 3.0 * std

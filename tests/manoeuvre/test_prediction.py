@@ -62,6 +62,14 @@ def test_models_that_fit_as_well_widen_the_interval_to_hold_them_all() -> None:
     assert two.low < rivals <= two.high * 1.0001
 
 
+def test_the_interval_of_a_model_is_not_narrowed_by_surer_ones_beside_it() -> None:
+    ship = ship_of(HULLS["mariner"])
+    unsure = identified(ship, relative=0.03)
+    surer = [identified(ship, relative=1e-3, name=f"ps-000000000000000{number}") for number in (3, 4)]
+    alone, beside = made(unsure), predict([unsure, *surer], CIRCLE, LOGS, 160.93, 64)
+    assert beside.figures == alone.figures
+
+
 def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> None:
     model = identified(ship_of(HULLS["mariner"]))
     circle = {one.name: one for one in predict([model], TurningCircle(radians(35.0)), LOGS, 160.93, 64).imo}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
@@ -11,11 +12,13 @@ from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, known_effects
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import silent
 from kempf.pipeline.diagnose.joint import better_together
+from kempf.pipeline.diagnose.ladder_step import rung
 from kempf.pipeline.diagnose.matters import better_ahead
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.shooting.ahead import shooting_range
+from kempf.workbench.rungs import compared
 from tests.diagnose.sailing import WORKERS
 from tests.real_data.voyage import Voyage
 
@@ -58,6 +61,15 @@ def test_her_diagnosis_names_the_three_with_sizes_that_predict(pond: Voyage) -> 
     assert first is not None and last is not None
     assert last.own.mean < 0.5 * first.own.mean and last.left_out.mean < 0.6 * first.left_out.mean
     assert last.held.mean < 0.3 * first.held.mean
+    # what a user sees fall: free runs with the parameters that predictions take
+    assert diagnosis.steps[-1].predicts_by_legs
+    rungs = compared([rung(number, step) for number, step in enumerate(diagnosis.steps)])
+    assert all(one.by_legs for one in rungs)
+    fitted, held = [one.free.fitted for one in rungs], [one.free.held_out for one in rungs]
+    assert fitted[-1] is not None and fitted[0] is not None and fitted[-1] < 0.6 * fitted[0]
+    assert held[-1] is not None and held[0] is not None and held[-1] < 0.6 * held[0]
+    (drag,) = rungs[-1].sizes
+    assert drag.name == "c" and drag.value == last.fit.values[-1] and drag.std == pytest.approx(last.std[-1])
     (free,) = (line for line in said if "median free-run error" in line)
     assert "in held-out manoeuvres" in free
     before, after = (np.median([run.relative_error for run in step.by_legs]) for step in diagnosis.steps[::3])

@@ -62,7 +62,7 @@ def test_words_about_an_effect_make_diagnoses_anew_at_most(tmp_path: Path, key: 
         shutil.copytree(ROOT / room, tmp_path / room, ignore=shutil.ignore_patterns("__pycache__"))
     before = {stage: code_version.fingerprint_in(tmp_path, stage) for stage in ("estimate", "diagnose")}
     path = tmp_path / "schemas" / "effects" / "cross_flow_drag.yaml"
-    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), key: "otherwise"}))
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), key: "otherwise"}, sort_keys=False))
     moved = {stage for stage, digest in before.items() if code_version.fingerprint_in(tmp_path, stage) != digest}
     words = {"title", "plain", "separated_by"}
     shown = {"equation", "reference", "confounded_with"}

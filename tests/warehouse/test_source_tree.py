@@ -87,7 +87,7 @@ def test_what_is_opened_by_name_counts(folder: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["# why\ntau: 3\n", "tau:   3\n\n", "{tau: 3}", "tau: 3\nplain: other words\n", "plain: a\ntau: 3\n"]
 )
-def test_comments_order_and_keys_left_out_of_a_data_file_do_not_count(text: str) -> None:
+def test_comments_and_keys_left_out_of_a_data_file_do_not_count(text: str) -> None:
     assert read_yaml(text.encode(), ["plain"]) == read_yaml(b"tau: 3\n", ["plain"])
 
 
@@ -96,6 +96,10 @@ def test_comments_order_and_keys_left_out_of_a_data_file_do_not_count(text: str)
 )
 def test_whatever_a_data_file_says_otherwise_counts(text: str) -> None:
     assert read_yaml(text.encode()) != read_yaml(b"tau: 3\n")
+
+
+def test_the_order_of_parameters_counts_as_it_is_that_of_their_covariance() -> None:
+    assert read_yaml(b"parameters: {c: {low: 0}, k: {low: 0}}") != read_yaml(b"parameters: {k: {low: 0}, c: {low: 0}}")
 
 
 def test_keys_are_left_out_however_deep_they_stand() -> None:

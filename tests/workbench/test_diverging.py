@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.diagnose.sentences import _share
 from kempf.pipeline.predict.free_run import FreeRun
-from kempf.workbench.cli.ladder import free_run_percent
+from kempf.workbench.rungs import compared, in_words
 
 
 def test_a_free_run_that_diverges_has_no_error() -> None:
@@ -20,7 +20,9 @@ def test_a_free_run_that_diverges_has_no_error() -> None:
 
 
 def test_it_is_called_so() -> None:
-    runs = {"seg-1": {}}
-    assert free_run_percent(None, runs) == free_run_percent(float("nan"), runs) == "diverges"
-    assert (free_run_percent(None, {}), free_run_percent(0.125, runs)) == ("-", "12.5")
+    runs: dict[str, object] = {"seg-1": {}}
+    rung = {"added": None, "effects": {}, "in_sample_error": 0.125, "in_sample": runs, "held_out_error": None}
+    diverging, alone = compared([{**rung, "held_out": runs}, {**rung, "held_out": {}}])
+    assert [in_words(one.free.held_out) for one in (diverging, alone)] == ["diverges", "-"]
+    assert in_words(alone.free.fitted) == "12.5"
     assert (_share(float("nan")), _share(0.125)) == ("divergence", "12.5")

@@ -198,6 +198,23 @@ def test_advice_follows_what_the_vessel_has(place: Path, late_added: Path, tmp_p
     assert "effects add" not in _advice(copytree(late_added, tmp_path / "added") / "w")
 
 
+def test_a_model_with_effects_is_shown_beside_the_plain_one(report: MadeReport, late_added: Path, tmp_path: Path):
+    there = Warehouse(str(copytree(late_added, tmp_path / "added") / "w"))
+    with_lag = PLAIN.model_copy(update={"effects": ("rudder_lag",)})
+    made = make_report(there, VESSEL, with_lag, Own())
+    evidence, wording = made.content.evidence, made.content.wording
+    assert [model.added for model in evidence.models] == ["", "first-order rudder lag"]
+    assert (evidence.given, evidence.improved, evidence.found) == (1, True, False)
+    assert wording.headline.startswith("The model with first-order rudder lag is adequate")
+    assert (wording.first_model, wording.last_model) == ("plain model", "model with first-order rudder lag")
+    assert wording.sections["ladder"].title == "What the effects of the model bring"
+    assert "beside the model with first-order rudder lag without refitting" in made.html
+    # the same manoeuvres, the same two models: what the ladder of the plain model's diagnosis says
+    for ours, theirs in zip(evidence.models, report.content.evidence.models, strict=True):
+        assert ours.fitted_error == pytest.approx(theirs.fitted_error, rel=0.02)
+    assert all(manoeuvre.after is not None for manoeuvre in evidence.manoeuvres)
+
+
 def _advice(warehouse: Path) -> str:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sections, "bytes_of", lambda _: b"<svg/>")
@@ -289,10 +306,14 @@ def test_numbers_of_the_page_are_those_that_are_stored(report: MadeReport, store
     assert (evidence.models[0].held_out_error, evidence.models[1].fitted_error) == (
         *(first["held_out_error"], last["in_sample_error"]),
     )
+    # predictions with the lag take the likelihood's parameters
+    assert not last["one_leg_ahead"]["better_than_one_step"]
+    assert not evidence.by_legs and "fitted to legs" not in html
     parameters = {one.name: one for one in evidence.models[-1].parameters}
     assert {name: one.value for name, one in parameters.items() if "." not in name} == last["hull"]
     tau = parameters["rudder_lag.tau"]
     assert abs(tau.value - LAG_S) < 3.0 * tau.std
+    assert tau.std == last["effects"]["rudder_lag.tau"]["std"], "widened as everywhere"
     assert f"{tau.value:.3f} ± {tau.std:.3f} s" in html and "plain model, ± 1 s.e." in html
     assert dict(report.content.provenance)["diagnosis"] == report.diagnosis_id and report.diagnosis_id in html
     for one in evidence.manoeuvres:

@@ -9,8 +9,9 @@ from typing import Any
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.ladder import FREE, LEG, free_run_percent, leg_percent
+from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
+from kempf.workbench.rungs import compared
 from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 _SHOWN = 12
@@ -96,18 +97,18 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
     for sentence in document["sentences"]:
         click.echo(f"  {sentence}")
     first = _first_model(document["ladder"][0])
+    beside = compared(document["ladder"])
     ladder = [
         [
             str(rung["step"]),
             rung["added"] or first,
-            *leg_percent(rung),
-            free_run_percent(rung["in_sample_error"], rung["in_sample"]),
-            free_run_percent(rung["held_out_error"], rung["held_out"]),
+            *percents(errors),
             number(rung["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
         ]
-        for rung in document["ladder"]
+        for rung, errors in zip(document["ladder"], beside, strict=True)
     ]
     print_table(["step", "added", *LEG, *FREE, "wind, m/s^2/s^0.5"], ladder, "Error one leg ahead and of free runs, %")
+    print_by_legs(beside)
     shown = [
         candidate
         for candidate in document["candidates"]

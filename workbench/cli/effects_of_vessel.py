@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.documents.tried import refits
 from kempf.workbench.ranked_warnings import show_warnings
+from kempf.workbench.rungs import by_manoeuvre, compared, in_words
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
 
 
@@ -127,6 +129,9 @@ def _print_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
     """Print the free-run errors manoeuvre by manoeuvre, before and after, fitted and held out apart."""
     from math import degrees
 
+    if compared([before, after])[-1].by_legs:
+        _print_legs(before, after)
+        return
     units = {"yaw_rate": ("deg/s", degrees(1.0)), "heading": ("deg", degrees(1.0)), "lateral_speed": ("m/s", 1.0)}
     rows = []
     for sample, key in (("fitted", "in_sample"), ("held out", "held_out")):
@@ -142,6 +147,20 @@ def _print_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
     for channel, (unit, _) in units.items():
         head += [f"{channel}, {unit}", "after"]
     print_table(head, rows, "Free-run rms, before and after")
+
+
+def _print_legs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+    """Print the errors a leg ahead and of free runs, all by the parameters fitted to legs, manoeuvre by manoeuvre."""
+    free = by_manoeuvre(before), by_manoeuvre(after)
+    rows = []
+    for sample, key, leg in (("fitted", "in_sample", "left_out_percent"), ("held out", "held_out", "held_out_percent")):
+        legs = [rung["one_leg_ahead"][leg] for rung in (before, after)]
+        for name in before[key]:
+            if name in after[key]:
+                cells = [*(errors.get(name) for errors in legs), *(errors.get(name, nan) for errors in free)]
+                rows.append([name, sample, *(in_words(nan if error is None else error) for error in cells)])
+    head = ["manoeuvre", "sample", "leg", "after", "free run", "after"]
+    print_table(head, rows, "Error, % of the motion, before and after; a leg of a fitted one by the others' parameters")
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

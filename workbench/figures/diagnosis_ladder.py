@@ -13,6 +13,8 @@ from kempf.workbench.figures.diagnosis_style import FULL, INK, LIMIT, PLAIN, new
 
 _MARKERS = (("o", "-"), ("s", "--"), ("^", ":"))
 _SHADES = (INK, "#009e73", LIMIT)
+#: of a name under the panels, all models together
+_LETTERS = 56
 
 
 def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
@@ -69,7 +71,8 @@ def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
         drive.set_ylabel(f"intensity, % of the {first}'s")
         drive.set_title("disturbances that the model needs")
         for panel in (error, drive):
-            panel.set_xticks(at, [_wrapped(f"+ {model.added}" if model.added else first) for model in ladder])
+            names = [f"+ {model.added}" if model.added else first for model in ladder]
+            panel.set_xticks(at, [_wrapped(name, len(ladder)) for name in names])
             panel.set_xlim(-0.45, len(ladder) - 0.55)
             panel.grid(visible=False, axis="x")
             panel.legend(loc="best")
@@ -91,10 +94,11 @@ def _label_ends(panel: Any, x: float, ends: Sequence[float]) -> None:
         lowest = place
 
 
-def _wrapped(text: str) -> str:
+def _wrapped(text: str, many: int) -> str:
+    """Return a name in lines that leave room for as many beside it."""
     from textwrap import fill
 
-    return fill(text, 18)
+    return fill(text, max(8, _LETTERS // many))
 
 
 def _percent(share: float) -> str:

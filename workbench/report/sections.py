@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from math import isfinite
 from typing import Any
 
+from kempf.schemas.diagnosis_evidence import FittedParameter
 from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
@@ -52,7 +53,7 @@ def _held_out_first(content: ReportContent) -> list[ShownManoeuvre]:
 
 def effects(content: ReportContent) -> list[Block]:
     """Ranked effects, and the whole catalogue as a table."""
-    first = content.wording.first_model
+    first = content.wording.diagnosed_model
     blocks: list[Block] = []
     if any(row.tested for row in content.effects):
         blocks.append(
@@ -92,9 +93,14 @@ def parameters(content: ReportContent) -> list[Block]:
     """Parameters of the first model and of the last, with their standard errors."""
     models = content.evidence.models
     shown = (models[0], models[-1]) if content.evidence.improved else (models[0],)
-    values = [{p.name: with_error(p.value, p.std, p.unit) for p in model.parameters} for model in shown]
-    rows = [(name, *(column.get(name, "-") for column in values)) for name in values[-1]]
-    head = ("parameter", *(f"{name}, ± 1 s.e." for name in _models(content)))
+    columns: dict[str, tuple[FittedParameter, ...]] = {}
+    for called, model in zip(_models(content), shown, strict=True):
+        columns[f"{called}, ± 1 s.e."] = model.parameters
+        if model.leg_parameters:
+            columns[f"{called}, fitted to legs, ± 1 s.e."] = model.leg_parameters
+    values = [{p.name: with_error(p.value, p.std, p.unit) for p in column} for column in columns.values()]
+    rows = [(p.name, *(column.get(p.name, "-") for column in values)) for p in shown[-1].parameters]
+    head = ("parameter", *columns)
     unsure = [name for name, model in zip(_models(content), shown, strict=True) if not model.converged]
     notes = [TextBlock(f"Not converged, the iterations allowed ran out: {name}.") for name in unsure]
     caption = "Parameters in SI units, angles in degrees, value ± one standard error"

@@ -6,7 +6,7 @@ an effect.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from shlex import quote
 from typing import Any
@@ -44,7 +44,9 @@ class ReportWording:
     #: findings, next_steps: Next steps with the most useful first.
     findings: tuple[str, ...]
     next_steps: tuple[str, ...]
-    #: first_model, last_model: What the first and the last model of the ladder are called.
+    #: What the model is called that the diagnosis began from.
+    diagnosed_model: str
+    #: first_model, last_model: What the first and the last model of the ladder are called; the first is the plain one.
     first_model: str
     last_model: str
     #: By the anchor of the section, in order.
@@ -81,22 +83,26 @@ def wording_of(
         Names of the effects that the vessel's current model has already.
     """
     verdict = str(content["verdict"])
-    effects = evidence.models[0].effects
-    first = f"model with {listed(effects)}" if effects else "plain model"
+    first, has = "plain model", evidence.diagnosed.effects
+    diagnosed = f"model with {listed(has)}" if has else first
     last = ("model with effects" if verdict in CLAIMING else "model with effects tried") if evidence.improved else first
+    if has and evidence.diagnosed is evidence.models[-1]:
+        last = "model with effects" if len(has) > 1 else diagnosed
     return ReportWording(
         verdict=verdict,
         title=f"{vessel}: diagnosis of the manoeuvring model",
-        headline=_headline(verdict, content, first),
+        headline=_headline(verdict, content, diagnosed, has),
         findings=tuple(content["sentences"]),
         next_steps=tuple(_next_steps(vessel, verdict, content, evidence, included)),
+        diagnosed_model=diagnosed,
         first_model=first,
         last_model=last,
-        sections=_sections(verdict, evidence, first, last),
+        sections=_sections(verdict, evidence, diagnosed, first, last),
     )
 
 
-def _headline(verdict: str, content: Mapping[str, Any], first: str) -> str:
+def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequence[str]) -> str:
+    """Return the verdict in a sentence; ``first`` is what the diagnosed model is called, ``has`` its effects."""
     titles = _titles(content)
     effects = " and ".join(" or ".join(titles[name] for name in group["effects"]) for group in content["sets"])
     return {
@@ -105,7 +111,10 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str) -> str:
         "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
         "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
-        "unexplained": f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
+        "unexplained": f"The model has {listed(has)}; beside {'it' if len(has) == 1 else 'them'} a systematic misfit "
+        "remains that no known effect accounts for."
+        if has
+        else f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
     }[verdict]
 
 
@@ -148,9 +157,12 @@ def _next_steps(
     return steps
 
 
-def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) -> dict[str, SectionWords]:
-    claims, improved = verdict in CLAIMING, evidence.improved
+def _sections(
+    verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: str, last: str
+) -> dict[str, SectionWords]:
+    claims, improved, found = verdict in CLAIMING, evidence.improved, evidence.found
     fitted = sum(not manoeuvre.held_out for manoeuvre in evidence.manoeuvres)
+    by_legs = ", with the parameters fitted to legs" if evidence.by_legs else ""
     coloured = (
         "Coloured: effects that the refit confirmed; those of one colour and one set cannot be distinguished."
         if claims
@@ -159,31 +171,40 @@ def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) 
     return {
         "effects": SectionWords(
             "Effects that are missing" if claims else "Effects that were tried",
-            f"Every effect of the catalogue was tried beside the {first} without refitting it. The score is the "
+            f"Every effect of the catalogue was tried beside the {diagnosed} without refitting it. The score is the "
             "evidence for an effect; the expected size, ± 1 s.e., is what it would be if it were included; the "
-            f"absorption is the share of it that the {first} imitates already: near 100 % it cannot be tested. "
+            f"absorption is the share of it that the {diagnosed} imitates already: near 100 % it cannot be tested. "
             f"{coloured}",
         ),
         "parameters": SectionWords(
             "Parameters",
             "Hull derivatives of eq. (16), divided by powers of the speed, and the parameters of the effects: "
-            "value ± 1 s.e. (one standard error, with the noise levels unknown).",
+            "value ± 1 s.e. (one standard error, with the noise levels unknown)."
+            + (
+                " Parameters fitted to legs predict them better than the likelihood's: predictions of manoeuvres take "
+                "them, and so do the free runs of this report."
+                if evidence.by_legs
+                else ""
+            ),
         ),
         "ladder": SectionWords(
             ("What including them brings" if claims else "Errors with the effects tried")
+            if found
+            else "What the effects of the model bring"
             if improved
             else f"Errors of the {first}",
-            "Left: error of a free run, which takes no measurement in, in percent of the motion. Held-out manoeuvres "
+            f"Left: error of a free run, which takes no measurement in, in percent of the motion{by_legs}. "
+            "Held-out manoeuvres "
             "were set aside before the first fit. Right: how strong the disturbances must be for the model to hold; "
             "they fall where an effect accounts for what they had to explain before.",
         ),
         "prediction": SectionWords(
             "Measured over predicted",
             "Fit is 100 (1 - |y - ŷ| / |y - mean y|) in percent, 100 being perfect. Horizons: one step takes every "
-            "measurement in; 10 s and 60 s ahead go without for so long; the free run takes none in. The initial "
-            "state and a constant wind force and current of each free run are fitted to that manoeuvre, as few for "
-            "every model; at the other horizons the filter estimates them on the way, which is why 60 s ahead may do "
-            "worse than a free run.",
+            f"measurement in; 10 s and 60 s ahead go without for so long; the free run takes none in{by_legs}. "
+            "The initial state and a constant wind force and current of each free run are fitted to that manoeuvre, as "
+            "few for every model; at the other horizons the filter estimates them on the way, which is why 60 s ahead "
+            "may do worse than a free run.",
         ),
         "innovations": SectionWords(
             "One-step errors in time",
@@ -203,14 +224,14 @@ def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) 
         ),
         "added": SectionWords(
             "The evidence, point by point",
-            f"For {'each effect that was added' if improved else 'the strongest candidate, which was not added'}: what "
+            f"For {'each effect that was added' if found else 'the strongest candidate, which was not added'}: what "
             "is left of the innovations against what the effect would explain of them, without what the fitted "
             "parameters can imitate. Points along the line are evidence; a cloud about the level is none.",
         ),
         "confusion": SectionWords(
             "Effects that look alike",
             "How much of what one effect would explain another would explain alike, for the highest scores beside the "
-            f"{first}. Pairs near 100 % cannot be distinguished by these manoeuvres.",
+            f"{diagnosed}. Pairs near 100 % cannot be distinguished by these manoeuvres.",
         ),
         "force": SectionWords(
             "Unmodelled sway and yaw acceleration",

@@ -1,0 +1,112 @@
+"""Rungs of a ladder as people compare them: errors in percent of the motion, sizes of what was added.
+
+Where predictions with the last model take the parameters fitted to legs, the free runs and sizes of every rung are with
+these, so that rungs compare; elsewhere with the likelihood's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Any
+
+from kempf.workbench.terminal import number
+
+#: what is said beside free runs and sizes of `Rung.by_legs`
+BY_LEGS = "free runs and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Mean errors over manoeuvres, percent of the motion; None where there are none, NaN where one diverges."""
+
+    fitted: float | None
+    left_out: float | None
+    held_out: float | None
+
+
+@dataclass(frozen=True)
+class Size:
+    """A parameter of an effect."""
+
+    name: str
+    value: float
+    std: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model of a ladder beside the others."""
+
+    #: Whether free runs and sizes are with the parameters fitted to legs.
+    by_legs: bool
+    leg: Errors
+    #: Left out is None.
+    free: Errors
+    #: Of the effect that was added.
+    sizes: tuple[Size, ...]
+
+
+def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
+    """Return rungs as they compare.
+
+    Parameters
+    ----------
+    rungs : sequence of mapping
+        JSON content of a ladder, in order.
+    """
+    by_legs = bool(rungs) and (rungs[-1].get("one_leg_ahead") or {}).get("better_than_one_step") is not None
+    return [Rung(by_legs, _leg(rung), _free(rung, by_legs=by_legs), _sizes(rung, by_legs=by_legs)) for rung in rungs]
+
+
+def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
+    """Return the free-run error of each manoeuvre with the parameters fitted to legs, percent of the motion."""
+    return {name: _percent(error) for name, error in rung["free_run_fitted_to_legs"].items()}
+
+
+def in_words(error: float | None) -> str:
+    """Return an error as people read it."""
+    return "-" if error is None else "diverges" if isnan(error) else number(error, 3)
+
+
+def _leg(rung: Mapping[str, Any]) -> Errors:
+    ahead = rung.get("one_leg_ahead") or {}
+    return Errors(*(_mean((ahead.get(f"{s}_percent") or {}).values()) for s in ("fitted", "left_out", "held_out")))
+
+
+def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
+    if by_legs and rung.get("free_run_fitted_to_legs"):
+        legs = by_manoeuvre(rung)
+        fitted, held = (_mean(legs[name] for name in rung[key] if name in legs) for key in ("in_sample", "held_out"))
+    else:
+        fitted, held = (
+            _percent(rung[error]) if rung[key] else None
+            for error, key in (("in_sample_error", "in_sample"), ("held_out_error", "held_out"))
+        )
+    return Errors(fitted, None, held)
+
+
+def _mean(errors: Iterable[float | None]) -> float | None:
+    every = [nan if error is None else error for error in errors]
+    return sum(every) / len(every) if every else None
+
+
+def _percent(error: float | None) -> float:
+    return nan if error is None else 100.0 * error
+
+
+def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[Size, ...]:
+    from kempf.pipeline.shooting.inflation import inflation
+
+    ahead = rung.get("one_leg_ahead") or {}
+    own = {n: one for n, one in rung["effects"].items() if n.partition(".")[0] == rung["added"]}
+    factor = 1.0
+    if by_legs and ahead:
+        own = {name: {**ahead["parameters"][name], "unit": one["unit"]} for name, one in own.items()}
+        factor = inflation(ahead["fitted_misfit"], ahead["left_out_misfit"])
+    return tuple(
+        Size(name.partition(".")[2], one["value"], factor * one["std"], one.get("unit") or "")
+        for name, one in own.items()
+    )
