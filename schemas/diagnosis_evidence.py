@@ -75,7 +75,8 @@ class FittedModel(_Part):
     #: manoeuvre, with ``leg_parameters`` where there are such.
     fitted_errors: Curve
     held_out_errors: Curve
-    #: fitted_error, held_out_error: Their means; NaN where there is none, or a free run diverges.
+    #: fitted_error, held_out_error: Their means, medians where there are ``leg_parameters``; NaN where there is none,
+    #: or a free run diverges.
     fitted_error: Number
     held_out_error: Number
     disturbances: tuple[DisturbanceLevel, ...]

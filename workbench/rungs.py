@@ -8,18 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isnan, nan
+from math import inf, isnan, nan
+from statistics import median
 from typing import Any
 
 from kempf.workbench.terminal import number
 
 #: what is said beside free runs and sizes of `Rung.by_legs`
-BY_LEGS = "free runs and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
+BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Mean errors over manoeuvres, percent of the motion; None where there are none, NaN where one diverges."""
+    """Errors over manoeuvres, percent of the motion; None where there are none, NaN where one diverges."""
 
     fitted: float | None
     left_out: float | None
@@ -42,8 +43,10 @@ class Rung:
 
     #: Whether free runs and sizes are with the parameters fitted to legs.
     by_legs: bool
+    #: Means.
     leg: Errors
-    #: Left out is None.
+    #: Means; with the parameters fitted to legs medians, as those of a ship that keeps no course may run off. Left out
+    #: is None.
     free: Errors
     #: Of the effect that was added.
     sizes: tuple[Size, ...]
@@ -79,7 +82,7 @@ def _leg(rung: Mapping[str, Any]) -> Errors:
 def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
     if by_legs and rung.get("free_run_fitted_to_legs"):
         legs = by_manoeuvre(rung)
-        fitted, held = (_mean(legs[name] for name in rung[key] if name in legs) for key in ("in_sample", "held_out"))
+        fitted, held = (_median(legs[name] for name in rung[key] if name in legs) for key in ("in_sample", "held_out"))
     else:
         fitted, held = (
             _percent(rung[error]) if rung[key] else None
@@ -91,6 +94,12 @@ def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
 def _mean(errors: Iterable[float | None]) -> float | None:
     every = [nan if error is None else error for error in errors]
     return sum(every) / len(every) if every else None
+
+
+def _median(errors: Iterable[float]) -> float | None:
+    every = [inf if isnan(error) else error for error in errors]
+    middle = median(every) if every else None
+    return nan if middle == inf else middle
 
 
 def _percent(error: float | None) -> float:

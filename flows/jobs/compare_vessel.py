@@ -114,7 +114,12 @@ def compare_vessel(
 
 
 def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> Comparison:
-    """Predict every run at a horizon; errors are those of `compare_vessel`."""
+    """Predict every run at a horizon; errors are those of `compare_vessel`.
+
+    Where predictions with the set take the likelihood's parameters, a free run is with these.
+    """
+    if hers.legs is None and horizon.name == "legs":
+        horizon = horizon_of("free")
     runs, segments, skipped = [], [], dict(hers.skipped)
     for k, bound_run in enumerate(hers.runs):
         progress(k, len(hers.runs), f"predicting {bound_run.segment.segment_id}")

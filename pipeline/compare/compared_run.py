@@ -37,7 +37,8 @@ def compare_run(
     held_out : bool
         Whether the parameters have not seen this run.
     legs : (ndarray, ndarray), optional
-        Hull and parameters of effects, shape (6,) and (p,), fitted to legs where these predict better than ``point``.
+        Hull and parameters of effects, shape (6,) and (p,), fitted to legs where these predict better than ``point``;
+        a horizon with these asks for them.
     levels_from : str, optional
         Where the noise levels come from, in words.
     own_levels : ndarray, shape (6,), optional
@@ -54,17 +55,22 @@ def compare_run(
     run = filtered.run
     own = point if own_levels is None else Point(point.hull, point.values, own_levels)
     free_run = free_run_of(filtered, point.hull, point.values)
-    free = of_free_run(filtered, free_run, horizon_of("free"))
+    by_legs = None if legs is None else free_run_of(filtered, *legs)
+    error = free_run.relative_error
+    if horizon.kind == "free run, fitted to legs":
+        assert by_legs is not None
+        free_run = by_legs
+    free = of_free_run(filtered, free_run, horizon if horizon.kind.startswith("free") else horizon_of("free"))
     return ComparedRun(
         name=run.name,
         held_out=held_out,
-        predicted=free if horizon.kind == "free run" else predict(filtered, point, horizon),
+        predicted=free if horizon.kind.startswith("free") else predict(filtered, point, horizon),
         free=free,
-        free_run_error=free_run.relative_error,
+        free_run_error=error,
         overshoots=compare_overshoots(
             run.time_s, run.measured[:, _HEADING], free_run.predicted[:, _HEADING], tuple(turns)
         ),
         residuals=RunResiduals(filtered, sensitivity.passed(filtered, own), free_run, tuple(phases)),
         levels_from=levels_from,
-        free_run_error_by_legs=None if legs is None else free_run_of(filtered, *legs).relative_error,
+        free_run_error_by_legs=None if by_legs is None else by_legs.relative_error,
     )

@@ -139,6 +139,8 @@ def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, 
     used = np.any([filtered.levels_used()[:3] for filtered in step.fit.runs], axis=0)
     intensities = zip(_DISTURBANCES, step.intensities, first.intensities, used, strict=True)
     fitted, held_out = (np.array([run.relative_error for run in runs]) for runs in step.free_runs(by_legs=by_legs))
+    # with the parameters fitted to legs the median, as the sentences: free runs of a ship that keeps no course run off
+    middle = _median if by_legs else _mean
     return FittedModel(
         effects=tuple(effect.title for effect in step.fit.model.ship.effects),
         # the diagnosed model is no step of the search, but as a rung it has one effect more than the one below
@@ -147,8 +149,8 @@ def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, 
         leg_parameters=_leg_parameters(step.ahead) if by_legs and step.ahead is not None else (),
         fitted_errors=fitted,
         held_out_errors=held_out,
-        fitted_error=float(np.mean(fitted)),
-        held_out_error=float(np.mean(held_out)) if held_out.size else None,
+        fitted_error=middle(fitted),
+        held_out_error=middle(held_out) if held_out.size else None,
         disturbances=tuple(
             DisturbanceLevel(name=name, unit=unit, intensity=float(level), share=float(level / base))
             for (name, unit), level, base, there in intensities
@@ -157,6 +159,15 @@ def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, 
         log_likelihood=step.fit.log_likelihood,
         converged=step.fit.converged,
     )
+
+
+def _mean(errors: Float) -> float:
+    return float(np.mean(errors))
+
+
+def _median(errors: Float) -> float:
+    middle = float(np.median(np.nan_to_num(errors, nan=np.inf)))
+    return middle if np.isfinite(middle) else np.nan
 
 
 def _leg_parameters(ahead: Ahead) -> tuple[FittedParameter, ...]:

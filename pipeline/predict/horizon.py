@@ -9,16 +9,16 @@ from typing import Literal
 
 from kempf.schemas.errors import UsageError
 
-Kind = Literal["one step", "ahead", "free run"]
+Kind = Literal["one step", "ahead", "free run", "free run, fitted to legs"]
 
 
 @dataclass(frozen=True)
 class Horizon:
     """A horizon."""
 
-    #: As it is asked for: ``1``, ``10s``, ``free``.
+    #: As it is asked for: ``1``, ``10s``, ``free``, ``legs``.
     name: str
-    #: One of {"one step", "ahead", "free run"}.
+    #: What the prediction takes of the measurements; fitted to legs: with other parameters than the likelihood's.
     kind: Kind
     #: Of ``ahead``.
     seconds: float | None = None
@@ -47,11 +47,13 @@ def horizon_of(text: str) -> Horizon:
         return Horizon("1", "one step")
     if asked == "free":
         return Horizon("free", "free run")
+    if asked == "legs":
+        return Horizon("legs", "free run, fitted to legs")
     seconds = re.fullmatch(r"(\d+(?:\.\d+)?) ?s", asked)
     if seconds and isfinite(float(seconds[1])) and float(seconds[1]) > 0.0:
         return Horizon(f"{float(seconds[1]):g}s", "ahead", float(seconds[1]))
     raise UsageError(
         "horizon_unknown",
-        f"--horizon {text[:40]!r} is none; expected 1 (one step), a time such as 10s or 60s, or free.",
+        f"--horizon {text[:40]!r} is none; expected 1 (one step), a time such as 10s or 60s, free, or legs.",
         "Write for instance --horizon 60s.",
     )

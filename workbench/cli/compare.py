@@ -39,8 +39,9 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
     "--horizon",
     default="free",
     show_default=True,
-    metavar="1|10s|60s|free",
-    help="One step, so many seconds ahead, or freely from the first instant on.",
+    metavar="1|10s|60s|free|legs",
+    help="One step, so many seconds ahead, or freely from the first instant on; legs: freely, with the parameters "
+    "fitted to legs where predictions of manoeuvres take these.",
 )
 @click.option("--where", "with_where", is_flag=True, help="Say also where the model fails.")
 @figure_option("Draw measured over predicted")
@@ -190,7 +191,10 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(mean['free_run_error_percent'])} %")
     if mean["free_run_error_percent_fitted_to_legs"]:
         by_legs = _with_error(mean["free_run_error_percent_fitted_to_legs"])
-        click.echo(f"  the same with the parameters fitted to legs, which predictions of manoeuvres take: {by_legs} %")
+        click.echo(
+            f"  the same with the parameters fitted to legs, which predictions of manoeuvres take (--horizon legs): "
+            f"{by_legs} %"
+        )
 
 
 def _print_where(title: str, where: dict[str, Any]) -> None:

@@ -15,6 +15,8 @@ _MARKERS = (("o", "-"), ("s", "--"), ("^", ":"))
 _SHADES = (INK, "#009e73", LIMIT)
 #: of a name under the panels, all models together
 _LETTERS = 56
+#: beyond so many times the largest mean a free run is drawn at the edge
+_EDGE = 3.0
 
 
 def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
@@ -29,6 +31,10 @@ def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
         figure = new_figure(3.4)
         error, drive = figure.subplots(1, 2)
         at = np.arange(len(ladder))
+        middle = "median" if any(model.leg_parameters for model in ladder) else "mean"
+        # a free run that runs off is drawn at the edge
+        means = 100.0 * np.array([[model.fitted_error, model.held_out_error] for model in ladder], dtype=np.float64)
+        edge = _EDGE * float(np.nanmax(means)) if np.isfinite(means).any() else np.inf
         for name, colour, marker, line, shift in (
             ("fitted", PLAIN, "o", "--", -0.06),
             ("held_out", FULL, "s", "-", 0.06),
@@ -37,10 +43,9 @@ def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
             if not runs[0].size:
                 continue
             for k, values in enumerate(runs):
-                error.plot(
-                    np.full(values.size, k + shift), values, marker, ms=3, color=colour, alpha=0.45, mec="none", ls=""
-                )
-            label = f"{name.replace('_', ' ')} (mean of {runs[0].size})"
+                x, y = np.full(values.size, k + shift), np.minimum(values, edge)
+                error.plot(x, y, marker, ms=3, color=colour, alpha=0.45, mec="none", ls="")
+            label = f"{name.replace('_', ' ')} ({middle} of {runs[0].size})"
             mean = [100.0 * getattr(model, f"{name}_error") for model in ladder]
             error.plot(at + shift, mean, color=colour, ls=line, marker=marker, ms=6, label=label)
             for x, y, model in zip(at + shift, mean, ladder, strict=True):

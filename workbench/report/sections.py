@@ -110,10 +110,11 @@ def parameters(content: ReportContent) -> list[Block]:
 def ladder(content: ReportContent) -> list[Block]:
     """Error ladder: figure and table."""
     models, first = content.evidence.models, content.wording.first_model
+    middle = "median" if content.evidence.by_legs else "mean"
     drawn = _picture(
         diagnosis_ladder.draw_ladder(models, first),
         diagnosis_ladder.describe_ladder(models, first),
-        "Free-run error by manoeuvre and its mean; disturbances that each model needs.",
+        f"Free-run error by manoeuvre and its {middle}, far ones at the edge; disturbances that each model needs.",
     )
     rows = []
     for number, model in enumerate(models):
@@ -127,7 +128,7 @@ def ladder(content: ReportContent) -> list[Block]:
         )
     levels = [f"{level.name}, {level.unit}" for level in models[0].disturbances]
     head = ("step", "model", "parameters", "fitted, %", "held out, %", "log-likelihood", *levels)
-    caption = "Free-run error (mean over manoeuvres, in percent of the motion) and disturbances"
+    caption = f"Free-run error ({middle} over manoeuvres, in percent of the motion) and disturbances"
     return [drawn, TableBlock(caption, head, rows, (0, *range(2, len(head)))), *_caveats(content)]
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kempf.flows.fleet.state import VesselState, fleet_state, responsible_code
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.leg_fit import by_name
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
@@ -23,7 +24,13 @@ if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
 
 #: Horizons that the pages offer: as asked for, and in words.
-HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
+HORIZONS = (
+    ("1", "one step"),
+    ("10s", "10 s ahead"),
+    ("60s", "60 s ahead"),
+    ("free", "free run"),
+    ("legs", "free run, fitted to legs"),
+)
 #: predictions kept: the ones made longest ago go first
 _MOST = 200
 #: what a model predicts, with the unit that its columns end with
@@ -55,6 +62,17 @@ class KeptPrediction:
         return None if mark is None else mark.astype(np.bool_)
 
 
+class Asked(NamedTuple):
+    """Which set and horizon are asked for."""
+
+    set_id: str
+    horizon: str
+    #: None where none is kept.
+    prediction: KeptPrediction | None
+    #: Whether predictions with the set take parameters fitted to legs.
+    by_legs: bool
+
+
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:
     """Return what a prediction of a vessel is kept under: other logs, corrections or code have another."""
     rests_on = [*state.inputs, state.ingest_ids, responsible_code()]
@@ -80,10 +98,10 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
         path.unlink()
 
 
-def kept_of(
-    warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None
-) -> tuple[str, str, KeptPrediction | None]:
-    """Return which set and horizon of a vessel are asked for, and the prediction with them; None where none is kept.
+def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None) -> Asked:
+    """Return which set and horizon of a vessel are asked for, and the prediction with them.
+
+    Without a horizon it is the free run with those parameters that predictions take.
 
     Raises
     ------
@@ -93,9 +111,13 @@ def kept_of(
         ``set_of_another_vessel``, ``horizon_unknown``.
     """
     chosen, _ = chosen_set(warehouse, vessel, asked_set or None)
-    horizon = horizon_of(asked_horizon or "free").name
+    horizon = horizon_of(asked_horizon or "legs").name
+    by_legs = bool(by_name(chosen))
+    if horizon == "legs" and not by_legs:
+        horizon = "free"
     rests_on = fleet_state(warehouse, [vessel])[vessel]
-    return chosen.parameter_set_id, horizon, kept(state, key_of(rests_on, chosen.parameter_set_id, horizon))
+    name = chosen.parameter_set_id
+    return Asked(name, horizon, kept(state, key_of(rests_on, name, horizon)), by_legs)
 
 
 def kept(state: Path, key: str) -> KeptPrediction | None:

@@ -49,6 +49,8 @@ def _keep_predictions(
     hers = bound(warehouse, vessel, name, progress)
     every = dict.fromkeys((*([asked] if asked else []), *(horizon_of(short).name for short, _ in HORIZONS)))
     for horizon in every:
+        if horizon == "legs" and hers.legs is None:
+            continue  # it is the free run
         try:
             keep(state, key_of(rests_on, name, horizon), compared(hers, horizon_of(horizon), progress))
         except DataRejected:
@@ -69,7 +71,7 @@ def _keep_those_of(warehouse: Warehouse, state: Path, vessel: str, name: str | N
 
     if name is not None:
         with suppress(KempfError):  # the page says why when it is asked for
-            if kept_of(warehouse, state, vessel, name, None)[2] is None:
+            if kept_of(warehouse, state, vessel, name, None).prediction is None:
                 _keep_predictions(warehouse, state, vessel, name, progress)
 
 

@@ -65,7 +65,7 @@ def gather(desk: Desk, segment_id: str, fields: Mapping[str, str]) -> Page:
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }
     if current:
-        set_id, horizon, prediction = kept_of(
+        set_id, horizon, prediction, _ = kept_of(
             desk.warehouse, desk.state, row.vessel, fields.get("set"), fields.get("h")
         )
         if prediction is not None and segment.segment_id in prediction.columns:

@@ -24,7 +24,7 @@ _CHANNEL = "yaw_rate"
 
 def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf compare --where --json` prints, where it is kept; else None."""
-    prediction = kept_of(desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h"))[2]
+    prediction = kept_of(desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h")).prediction
     return None if prediction is None else prediction.document
 
 
@@ -42,18 +42,20 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     NotFound
         ``no_run``, ``no_parameter_set``, ``no_evidence``.
     """
-    set_id, horizon, prediction = kept_of(desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h"))
+    set_id, horizon, prediction, by_legs = kept_of(
+        desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h")
+    )
     prediction_before: KeptPrediction | None = None
     content: dict[str, Any] = {
         "vessel": vessel,
         "set_id": set_id,
         "horizon": horizon,
-        "horizons": HORIZONS,
+        "horizons": [pair for pair in HORIZONS if pair[0] != "legs" or by_legs],
         "made": None if prediction is None else prediction.document,
         "beside": None,
     }
     if beside := fields.get("beside"):
-        other_id, _, prediction_before = kept_of(desk.warehouse, desk.state, vessel, beside, horizon)
+        other_id, _, prediction_before, _ = kept_of(desk.warehouse, desk.state, vessel, beside, horizon)
         content |= {"beside": other_id, "before": None if prediction_before is None else prediction_before.document}
     if prediction is not None:
         runs = sorted(prediction.document["runs"], key=lambda run: (not run["held_out"], run["start"]))

@@ -88,7 +88,7 @@ def predicted_frame(desk: Desk, segment_id: str, fields: Mapping[str, str], bins
         ``instant_unreadable``, ``window_empty``.
     """
     segment = segments.by_prefix(desk.warehouse, segment_id)
-    _, _, prediction = kept_of(desk.warehouse, desk.state, segment.vessel, fields.get("set"), fields.get("h"))
+    prediction = kept_of(desk.warehouse, desk.state, segment.vessel, fields.get("set"), fields.get("h")).prediction
     if prediction is None or segment.segment_id not in prediction.columns:
         raise NotFound("no_prediction", "This manoeuvre is not predicted.", "Predict on the model's page.")
     row = logs.of_ingest(desk.warehouse, segment.ingest_id)
