@@ -55,6 +55,20 @@ class Planned:
         searched = self._searched if now == self._said else search_again(warehouse, self.log, now)
         search_log.store(warehouse, [searched])
 
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What speaks against the manoeuvre as it would be, sentences."""
+        negative = [
+            f"{number} ({angle:.1f} deg)" for number, angle in enumerate(self.after.overshoots_deg, 1) if angle < 0.0
+        ]
+        if self.correction.action not in ("correct", "add") or not negative:
+            return ()
+        which = "overshoot " if len(negative) == 1 else "overshoots "
+        return (
+            f"{which}{', '.join(negative)} below zero: she turned back before {self.after.psi0_deg:.3g} deg from "
+            "the base course, so that the bounds may begin or end within a leg, or hold two manoeuvres",
+        )
+
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
@@ -63,6 +77,7 @@ class Planned:
             "before": self.before.show(self.log.file_name) if self.before else None,
             "after": self.after.show(self.log.file_name),
             "following": self.following.show(),
+            "doubts": list(self.doubts),
         }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree
 from types import ModuleType
@@ -96,6 +97,9 @@ def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse
     before = history.standing(warehouse, "mariner")
     bounds = zigzag.start_utc_ns + 7 * SECOND_NS, zigzag.end_utc_ns
     planned = plan_for(warehouse, zigzag.segment_id, "correct", "she was still turning", bounds)
+    assert planned.doubts == () and planned.show()["doubts"] == []
+    (doubt,) = replace(planned, after=replace(planned.after, overshoots_deg=(3.0, -1.8))).doubts
+    assert doubt.startswith("overshoot 2 (-1.8 deg) below zero: she turned back before ")
     planned.store(warehouse)
     (corrected,) = segments.current(warehouse, "mariner")
     assert (corrected.start_utc_ns, corrected.end_utc_ns) == bounds and corrected == planned.after

@@ -168,7 +168,8 @@ def _words(planned: Planned) -> str:
         sentence += f" and is {_described(planned.after)}"
     following = planned.following
     current = ", the current one among them" if following.current else ""
-    return f"{sentence}: {counted(len(following.set_ids), 'parameter set')} of {following.vessel!r} superseded{current}"
+    superseded = f"{counted(len(following.set_ids), 'parameter set')} of {following.vessel!r} superseded{current}"
+    return "; ".join((f"{sentence}: {superseded}", *planned.doubts))
 
 
 def _described(segment: Segment) -> str:

@@ -76,6 +76,7 @@ def command(
     from kempf.flows.jobs.compare_predicted import measured_beside, other_orders
     from kempf.flows.jobs.predict_request import PredictRequest
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.prediction import prediction_document
 
     require_figures(figure, code="cannot_write")
     _require_fitting(manoeuvre, rudder_deg, angles)
@@ -84,22 +85,22 @@ def command(
     with progress_bar() as progress:
         predicted = predict_checked(Warehouse(uri), vessel, request, progress)
         measured = measured_beside(Warehouse(uri), predicted, progress) if compare else None
+    others = other_orders(Warehouse(uri), predicted) if compare else {}
     if figure is not None:
         from kempf.workbench.figures.manoeuvre import draw_manoeuvre
 
         with writing(figure):
             draw_manoeuvre(predicted.prediction, figure, _title(predicted))
     if as_json:
-        beside = {"measured": [run.show() for run in measured]} if measured is not None else {}
-        print_json({**predicted.show(), **beside, "figure": str(figure) if figure else None})
+        drawn = str(figure) if figure else None
+        print_json(prediction_document(predicted, measured, others, drawn))
     else:
         _print_predicted(predicted, figure)
         if measured is not None:
             _print_measured(measured)
-            others = other_orders(Warehouse(uri), predicted)
-            if others:
-                by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
-                print_paragraph(f"not compared, as they are of other angles: {by_option}")
+        if others:
+            by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
+            print_paragraph(f"not compared, as they are of other angles: {by_option}")
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:
@@ -179,6 +180,9 @@ def _print_models(predicted: Predicted) -> None:
 
 
 def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
+    from kempf.flows.jobs.one_sided import one_sided
+    from kempf.workbench.documents.prediction import sentence_of
+
     if not measured:
         print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
         return
@@ -202,6 +206,8 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     if judged:
         inside = sum(entry["inside"] for entry in judged)
         print_paragraph(f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction")
+    for found in one_sided(measured):
+        print_paragraph(sentence_of(found))
     for run in measured:
         if run.why:
             print_paragraph(f"{run.segment_id}: {run.why}")

@@ -17,6 +17,7 @@ from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.whole_file import whole_file
 
@@ -73,6 +74,11 @@ class Asked(NamedTuple):
     by_legs: bool
 
 
+def free_horizon(parameter_set: ParameterSet) -> str:
+    """Return the horizon of a free run with those parameters of a set that predictions of manoeuvres take."""
+    return "legs" if by_name(parameter_set) else "free"
+
+
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:
     """Return what a prediction of a vessel is kept under: other logs, corrections or code have another."""
     rests_on = [*state.inputs, state.ingest_ids, responsible_code()]
@@ -111,13 +117,13 @@ def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | Non
         ``set_of_another_vessel``, ``horizon_unknown``.
     """
     chosen, _ = chosen_set(warehouse, vessel, asked_set or None)
-    horizon = horizon_of(asked_horizon or "legs").name
-    by_legs = bool(by_name(chosen))
-    if horizon == "legs" and not by_legs:
-        horizon = "free"
+    freely = free_horizon(chosen)
+    horizon = horizon_of(asked_horizon or freely).name
+    if horizon == "legs":
+        horizon = freely
     rests_on = fleet_state(warehouse, [vessel])[vessel]
     name = chosen.parameter_set_id
-    return Asked(name, horizon, kept(state, key_of(rests_on, name, horizon)), by_legs)
+    return Asked(name, horizon, kept(state, key_of(rests_on, name, horizon)), freely == "legs")
 
 
 def kept(state: Path, key: str) -> KeptPrediction | None:

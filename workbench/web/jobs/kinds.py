@@ -162,12 +162,13 @@ def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
 def sail(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Predict a standard manoeuvre; the result is what `kempf predict --compare --json` prints, with what is drawn."""
     from kempf.flows.jobs.checked_prediction import predict_checked
-    from kempf.flows.jobs.compare_predicted import measured_beside
+    from kempf.flows.jobs.compare_predicted import measured_beside, other_orders
+    from kempf.workbench.documents.prediction import prediction_document
     from kempf.workbench.web.data.sailed import curves_of, request_of
 
     predicted = predict_checked(warehouse, arguments["vessel"], request_of(arguments), progress)
     measured = measured_beside(warehouse, predicted, progress)
-    document = {**predicted.show(), "measured": [manoeuvre.show() for manoeuvre in measured], "figure": None}
+    document = prediction_document(predicted, measured, other_orders(warehouse, predicted))
     fields = {name: arguments[name] for name in ("manoeuvre", "rudder", "angles", "side", "speed", "set")}
     to = f"{of_vessel(arguments['vessel'])}/predict?{urlencode(fields)}"
     return {"to": to, "document": document, "curves": curves_of(predicted.prediction)}

@@ -11,12 +11,10 @@ from kempf.flows.jobs.out_of_date import said_of_sets
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.documents.compared_sets import compared_sets
-from kempf.workbench.web.data.predictions import kept, key_of
+from kempf.workbench.web.data.predictions import free_horizon, kept, key_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.differences import draw_differences
 from kempf.workbench.web.pages.page import Page
-
-_HORIZON = "free"
 
 
 def document(desk: Desk, a: str, b: str) -> dict[str, Any]:
@@ -88,8 +86,8 @@ def _inputs(first: ParameterSet, second: ParameterSet) -> Iterator[tuple[str, An
 def _runs(desk: Desk, first: ParameterSet, second: ParameterSet) -> dict[str, Any]:
     """Return how both predict the same manoeuvres freely, and which of the two predictions are not made yet."""
     state = fleet_state(desk.warehouse, [first.vessel])[first.vessel]
-    names = (first.parameter_set_id, second.parameter_set_id)
-    predictions = {name: kept(desk.state, key_of(state, name, _HORIZON)) for name in names}
+    keys = {one.parameter_set_id: key_of(state, one.parameter_set_id, free_horizon(one)) for one in (first, second)}
+    predictions = {name: kept(desk.state, key) for name, key in keys.items()}
     lacking = [name for name, prediction in predictions.items() if prediction is None]
     if lacking:
         return {"lacking": lacking, "rows": []}

@@ -1,0 +1,68 @@
+"""Figures that measured manoeuvres all have to one side of what is predicted: no scatter, but what a model lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import sqrt
+from statistics import mean, median, stdev
+
+from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
+
+#: manoeuvres, and standard errors of their mean, from which it is hardly chance that all lie to one side
+_FEWEST, _CLEAR = 4, 3.0
+#: relative error below which nobody minds
+_LEAST = 0.05
+
+
+@dataclass(frozen=True)
+class OneSided:
+    """A figure that is predicted too large in all measured manoeuvres, or too small in all."""
+
+    #: Name of the figure.
+    figure: str
+    manoeuvres: int
+    #: Predicted over measured, less 1, per cent: the middle one, the smallest and the largest.
+    median_percent: float
+    low_percent: float
+    high_percent: float
+
+    def sentence(self, words: str) -> str:
+        """Say it.
+
+        Parameters
+        ----------
+        words : str
+            What the figure is called.
+        """
+        return (
+            f"{words}: predicted too {'large' if self.median_percent > 0.0 else 'small'} in all {self.manoeuvres} "
+            f"manoeuvres, by {abs(self.median_percent):.0f} % in the median ({self.low_percent:+.0f} to "
+            f"{self.high_percent:+.0f} %): no scatter, the model lacks something"
+        )
+
+
+def one_sided(measured: Sequence[MeasuredManoeuvre]) -> tuple[OneSided, ...]:
+    """Return the figures that are predicted too large in all manoeuvres or too small in all, in their order.
+
+    Parameters
+    ----------
+    measured : sequence of MeasuredManoeuvre
+        To both sides: figures that change their sign with the side are compared by their size.
+    """
+    by_figure: dict[str, list[float]] = {}
+    for manoeuvre in measured:
+        for beside in manoeuvre.figures:
+            if beside.predicted.value is not None and beside.measured != 0.0:
+                by_figure.setdefault(beside.name, []).append(abs(beside.predicted.value) / abs(beside.measured) - 1.0)
+    return tuple(
+        OneSided(name, len(errors), *(100.0 * error for error in (median(errors), min(errors), max(errors))))
+        for name, errors in by_figure.items()
+        if len(errors) >= _FEWEST and _clearly_one_sided(errors)
+    )
+
+
+def _clearly_one_sided(errors: Sequence[float]) -> bool:
+    if min(errors) * max(errors) <= 0.0 or abs(median(errors)) < _LEAST:
+        return False
+    return abs(mean(errors)) > _CLEAR * stdev(errors) / sqrt(len(errors))

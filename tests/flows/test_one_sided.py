@@ -1,0 +1,48 @@
+"""Figures that are all predicted to one side of what was measured."""
+
+from __future__ import annotations
+
+import pytest
+
+from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
+from kempf.flows.jobs.one_sided import one_sided
+from kempf.pipeline.manoeuvre.prediction import Figure
+
+
+def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> MeasuredManoeuvre:
+    """One that was sailed to starboard and to port in turn: name, measured and predicted of each figure."""
+    every = tuple(Beside(name, there, None, None, Figure(value, None, None)) for name, there, value in figures)
+    return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, "held_out", every)
+
+
+def rates(factors: list[float]) -> list[MeasuredManoeuvre]:
+    signs = [1.0 if number % 2 else -1.0 for number in range(len(factors))]
+    return [
+        manoeuvre(number, ("steady_yaw_rate_deg_s", 2.0 * sign, 2.0 * sign * factor))
+        for number, (sign, factor) in enumerate(zip(signs, factors, strict=True))
+    ]
+
+
+def test_what_is_too_large_in_all_is_said_whatever_the_side() -> None:
+    (found,) = one_sided(rates([1.14, 1.2, 1.17, 1.33, 1.15]))
+    assert (found.figure, found.manoeuvres) == ("steady_yaw_rate_deg_s", 5)
+    shown = (found.median_percent, found.low_percent, found.high_percent)
+    assert shown == pytest.approx((17.0, 14.0, 33.0))
+    assert found.sentence("steady yaw rate") == (
+        "steady yaw rate: predicted too large in all 5 manoeuvres, by 17 % in the median (+14 to +33 %): no scatter, "
+        "the model lacks something"
+    )
+
+
+@pytest.mark.parametrize(
+    "factors",
+    [[1.14, 1.2, 1.17], [1.14, 1.2, 1.17, 1.33, 0.98], [0.99, 0.98, 0.97, 0.98, 0.96], [1.01, 1.06, 1.07, 1.4]],
+    ids=["few", "to both sides", "hardly", "scattered"],
+)
+def test_what_may_be_chance_or_matters_little_is_not(factors: list[float]) -> None:
+    assert one_sided(rates(factors)) == ()
+
+
+def test_a_figure_without_prediction_counts_not() -> None:
+    figures = [("advance_m", 100.0, 80.0)] * 3 + [("advance_m", 100.0, None)]
+    assert one_sided([manoeuvre(number, figure) for number, figure in enumerate(figures)]) == ()
