@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
@@ -35,10 +36,14 @@ _LEVELS = {
 _LEAST = {"wind_m_s2": 1.0, "current_m_s": 1.0}
 _LEAST_OF_A_MEASUREMENT = 0.02
 
+_FITTED_TO_LEGS = (
+    "parameters are those fitted to legs, which predict manoeuvres better than the likelihood's (kempf params show)"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class ShipOfSet:
-    """What a parameter set says of a ship."""
+    """What a parameter set says of a ship: by the parameters that predictions of manoeuvres take."""
 
     parameter_set: ParameterSet
     hull: Hull
@@ -56,14 +61,22 @@ class ShipOfSet:
     noise: NoiseLevels
     #: What a linear model about a straight course has not, or not wholly, of the effects.
     remarks: tuple[str, ...]
-    #: What speaks against these numbers: the set's own, what was assumed, and the remarks.
+    #: What speaks against the parameters: of the likelihood's what the set says, of those fitted to legs that they are.
+    of_parameters: tuple[str, ...]
+    #: What speaks against these numbers: the above, what was assumed, and the remarks.
     warnings: tuple[str, ...]
 
     @property
     def effect_parameters(self) -> tuple[StoredValue, ...]:
         """The parameters of the effects, in their order."""
+        if self.effects is None:
+            return ()
         held = {p.name: p for p in self.parameter_set.parameters}
-        return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
+        stds = np.sqrt(np.diag(self.covariance)[len(HULL_PARAMETERS) :])
+        return tuple(
+            replace(held[name], value=float(value), std=float(std) if np.isfinite(std) else None)
+            for name, value, std in zip(self.effects.model.names, self.effects.values, stds, strict=True)
+        )
 
 
 def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: float | None = None) -> ShipOfSet:
@@ -91,18 +104,28 @@ def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: fl
         )
     by_name = {p.name: p.value for p in parameter_set.parameters if p.value is not None}
     hull = Hull(*(float(by_name.get(name, np.nan)) for name in HULL_PARAMETERS))
+    legs = fitted_to_legs(parameter_set)
+    if legs is not None:
+        hull = Hull(*(float(value) for value in legs[0]))
     require_numbers(hull, float(speed))
     profile = vessels.get(warehouse, str(parameter_set.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
     effects = _effects(parameter_set, profile)
+    if effects is not None and legs is not None:
+        effects = replace(effects, values=legs[1])
     remarks = sentences(carried(hull, effects, float(speed), arm or 0.0))
     noise, assumed = _noise(parameter_set, spec)
-    warnings = [*parameter_set.warnings, *assumed, *remarks]
+    of_parameters = parameter_set.warnings if legs is None else (_FITTED_TO_LEGS,)
+    warnings = [*of_parameters, *assumed, *remarks]
     if not parameter_set.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {parameter_set.convergence.get('reason')}")
     covariance = covariance_of(parameter_set, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
+    if legs is not None:
+        covariance = legs[3] ** 2 * legs[2]
     numbers = (float(speed), arm or 0.0, profile.length_m)
-    return ShipOfSet(parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
+    return ShipOfSet(
+        parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks, of_parameters, tuple(warnings)
+    )
 
 
 def _effects(parameter_set: ParameterSet, profile: VesselProfile) -> ShipEffects | None:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 
 from kempf.flows.jobs.leg_fit import fitted_to_legs
+from kempf.flows.jobs.ship_model import ship_of_set
+from kempf.flows.jobs.standing_model import standing
+from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+from tests.late import VESSEL
 
 NAMES = ("a11", "a12", "a21", "a22", "b1", "b2", "wind_force.c", "wind_force.k", "cross_flow_drag.c")
 
@@ -39,3 +46,23 @@ def test_parameters_fitted_to_legs_are_in_the_order_of_the_set_and_its_covarianc
 
 def test_where_the_likelihood_predicts_as_well_there_are_none() -> None:
     assert fitted_to_legs(stored(None)) is None
+
+
+def test_steering_and_exports_take_what_predictions_take(late_added: Path) -> None:
+    warehouse = Warehouse(str(late_added / "w"))
+    with_lag = standing(warehouse, VESSEL)
+    assert with_lag is not None and with_lag.parent is not None
+    plain = parameter_sets.get(warehouse, with_lag.parent)
+    legs = fitted_to_legs(plain)
+    assert legs is not None and fitted_to_legs(with_lag) is None
+    hull, _, covariance, factor = legs
+    ship = ship_of_set(warehouse, plain)
+    assert np.array_equal(ship.hull.array(), hull)
+    assert np.array_equal(ship.covariance, factor**2 * covariance)
+    assert ship.of_parameters == ship.warnings[:1] and "fitted to legs" in ship.warnings[0]
+    right = ship_of_set(warehouse, with_lag)
+    values = {p.name: p.value for p in with_lag.parameters}
+    assert right.hull.array().tolist() == [values[name] for name in HULL_PARAMETERS]
+    assert right.of_parameters == with_lag.warnings
+    (tau,) = right.effect_parameters
+    assert tau == next(p for p in with_lag.parameters if p.name == "rudder_lag.tau")

@@ -219,7 +219,7 @@ def steering(
     constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)
     judged = stability(linear.hull, linear.covariance, ship.speed_m_s)
     effects = ship.effect_parameters
-    warnings = [*ship.parameter_set.warnings, *constants.warnings, *ship.remarks]
+    warnings = [*ship.of_parameters, *constants.warnings, *ship.remarks]
     if linear.settled:
         warnings.append("the states of effects are settled in K, T1, T2, T3 and T: they hold for slow motion")
     if not ship.parameter_set.convergence.get("converged"):
