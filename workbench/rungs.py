@@ -1,7 +1,7 @@
 """Rungs of a ladder as people compare them: errors in percent of the motion, sizes of what was added.
 
-Where predictions with the last model take the parameters fitted to legs, the free runs and sizes of every rung are with
-these, so that rungs compare; elsewhere with the likelihood's.
+Where the last model has effects and predictions with it take the parameters fitted to legs, the free runs and sizes of
+every rung are with these, so that rungs compare; elsewhere with the likelihood's.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
     rungs : sequence of mapping
         JSON content of a ladder, in order.
     """
-    by_legs = bool(rungs) and (rungs[-1].get("one_leg_ahead") or {}).get("better_than_one_step") is not None
+    last: Mapping[str, Any] = rungs[-1] if rungs else {}
+    by_legs = bool(last.get("effects")) and bool((last.get("one_leg_ahead") or {}).get("better_than_one_step"))
     return [Rung(by_legs, _leg(rung), _free(rung, by_legs=by_legs), _sizes(rung, by_legs=by_legs)) for rung in rungs]
 
 

@@ -66,8 +66,7 @@ def evidence_of(
     """
     steps = (*diagnosis.given, *diagnosis.steps)
     first, last = steps[0], steps[-1]
-    # of all models where predictions with the last one take these, so that they compare
-    by_legs = last.predicts_by_legs
+    by_legs = last.shown_by_legs
     before = _Judged(first, diagnosis, phases, workers.map)
     after = before if last is first else _Judged(last, diagnosis, phases, workers.map)
     held = {run.name for run in diagnosis.held}
@@ -108,7 +107,7 @@ class _Judged:
         phases: Mapping[str, Sequence[PhaseInterval]],
         each: Callable[[Callable[[JudgedRun], Float], Sequence[JudgedRun]], Iterable[Float]],
     ) -> None:
-        by_legs = diagnosis.steps[-1].predicts_by_legs
+        by_legs = diagnosis.steps[-1].shown_by_legs
         self.fitted = judged_fitted(step, phases, by_legs=by_legs)
         self.held_out = judged_held_out(step, diagnosis.held, phases, by_legs=by_legs)
         self.all = (*self.fitted, *self.held_out)

@@ -54,6 +54,15 @@ class Step:
         """Whether predictions take the parameters fitted to legs: these predict them better than the likelihood's."""
         return self.ahead is not None and self.ahead.disagrees is not None
 
+    @property
+    def shown_by_legs(self) -> bool:
+        """Whether a ladder that ends here shows its free runs with parameters fitted to legs.
+
+        A plain model alone is shown by the likelihood's: an effect that is added later is compared with these, unless
+        the model lacks something even then.
+        """
+        return self.predicts_by_legs and bool(self.fit.ship.model.effects)
+
     def free_runs(self, *, by_legs: bool) -> tuple[tuple[FreeRun, ...], tuple[FreeRun, ...]]:
         """Return the free runs of fitted and of held-out manoeuvres.
 

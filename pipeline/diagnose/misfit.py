@@ -26,7 +26,7 @@ def where_left(diagnosis: Diagnosis, phases: Mapping[str, Sequence[PhaseInterval
         the model; None where the model runs away from every run.
     """
     step = diagnosis.steps[-1]
-    by_legs = step.predicts_by_legs
+    by_legs = step.shown_by_legs
     if diagnosis.held:
         judged = judged_held_out(step, diagnosis.held, phases, by_legs=by_legs)
     else:

@@ -74,9 +74,19 @@ class Asked(NamedTuple):
     by_legs: bool
 
 
-def free_horizon(parameter_set: ParameterSet) -> str:
-    """Return the horizon of a free run with those parameters of a set that predictions of manoeuvres take."""
-    return "legs" if by_name(parameter_set) else "free"
+def free_horizon(parameter_set: ParameterSet, asked: str | None = None) -> str:
+    """Return the horizon of a free run as it is shown of a set.
+
+    Of a model with effects it is with the parameters that predictions take, as in its ladder. Of a plain one only where
+    that is asked for: what effects bring is seen beside the likelihood's.
+
+    Parameters
+    ----------
+    asked : str, optional
+        ``legs`` takes those fitted to legs of a plain model too, where predictions take them.
+    """
+    wanted = asked == "legs" or bool(parameter_set.model_spec.get("effects"))
+    return "legs" if wanted and by_name(parameter_set) else "free"
 
 
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:
@@ -107,7 +117,7 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
 def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None) -> Asked:
     """Return which set and horizon of a vessel are asked for, and the prediction with them.
 
-    Without a horizon it is the free run with those parameters that predictions take.
+    Without a horizon it is that of `free_horizon`.
 
     Raises
     ------
@@ -117,13 +127,13 @@ def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | Non
         ``set_of_another_vessel``, ``horizon_unknown``.
     """
     chosen, _ = chosen_set(warehouse, vessel, asked_set or None)
-    freely = free_horizon(chosen)
-    horizon = horizon_of(asked_horizon or freely).name
+    horizon = horizon_of(asked_horizon or free_horizon(chosen)).name
     if horizon == "legs":
-        horizon = freely
+        horizon = free_horizon(chosen, "legs")
     rests_on = fleet_state(warehouse, [vessel])[vessel]
     name = chosen.parameter_set_id
-    return Asked(name, horizon, kept(state, key_of(rests_on, name, horizon)), freely == "legs")
+    by_legs = free_horizon(chosen, "legs") == "legs"
+    return Asked(name, horizon, kept(state, key_of(rests_on, name, horizon)), by_legs)
 
 
 def kept(state: Path, key: str) -> KeptPrediction | None:

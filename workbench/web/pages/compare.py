@@ -86,7 +86,11 @@ def _inputs(first: ParameterSet, second: ParameterSet) -> Iterator[tuple[str, An
 def _runs(desk: Desk, first: ParameterSet, second: ParameterSet) -> dict[str, Any]:
     """Return how both predict the same manoeuvres freely, and which of the two predictions are not made yet."""
     state = fleet_state(desk.warehouse, [first.vessel])[first.vessel]
-    keys = {one.parameter_set_id: key_of(state, one.parameter_set_id, free_horizon(one)) for one in (first, second)}
+    # both by the same kind of fit
+    asked = next((horizon for horizon in map(free_horizon, (first, second)) if horizon == "legs"), None)
+    keys = {
+        one.parameter_set_id: key_of(state, one.parameter_set_id, free_horizon(one, asked)) for one in (first, second)
+    }
     predictions = {name: kept(desk.state, key) for name, key in keys.items()}
     lacking = [name for name, prediction in predictions.items() if prediction is None]
     if lacking:
