@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
@@ -172,8 +171,7 @@ def as_mat(model: Linear) -> bytes:
 
 
 def _parameters(ship: ShipOfSet) -> tuple[list[str], list[float], list[float | None], list[str]]:
-    held = {p.name: p for p in ship.parameter_set.parameters}
-    parameters = [*(held[name] for name in HULL_PARAMETERS), *ship.effect_parameters]
+    parameters = ship.parameters
     spread = [p.std if p.std is not None and p.std == p.std else None for p in parameters]
     return [p.name for p in parameters], [p.value for p in parameters], spread, [p.unit for p in parameters]
 

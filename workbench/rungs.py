@@ -12,6 +12,8 @@ from math import inf, isnan, nan
 from statistics import median
 from typing import Any
 
+from kempf.flows.jobs.leg_fit import taken_by_predictions
+from kempf.pipeline.shooting.inflation import inflation
 from kempf.workbench.terminal import number
 
 #: what is said beside free runs and sizes of `Rung.by_legs`
@@ -33,7 +35,8 @@ class Size:
 
     name: str
     value: float
-    std: float
+    #: None where it is not known.
+    std: float | None
     unit: str
 
 
@@ -61,13 +64,16 @@ def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
         JSON content of a ladder, in order.
     """
     last: Mapping[str, Any] = rungs[-1] if rungs else {}
-    by_legs = bool(last.get("effects")) and bool((last.get("one_leg_ahead") or {}).get("better_than_one_step"))
+    by_legs = bool(last.get("effects")) and taken_by_predictions(last.get("one_leg_ahead"))
     return [Rung(by_legs, _leg(rung), _free(rung, by_legs=by_legs), _sizes(rung, by_legs=by_legs)) for rung in rungs]
 
 
 def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
-    """Return the free-run error of each manoeuvre with the parameters fitted to legs, percent of the motion."""
-    return {name: _percent(error) for name, error in rung["free_run_fitted_to_legs"].items()}
+    """Return the free-run error of each manoeuvre with the parameters fitted to legs, percent of the motion.
+
+    Of manoeuvres that came later there is none.
+    """
+    return {name: _percent(error) for name, error in (rung.get("free_run_fitted_to_legs") or {}).items()}
 
 
 def in_words(error: float | None) -> str:
@@ -108,15 +114,18 @@ def _percent(error: float | None) -> float:
 
 
 def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[Size, ...]:
-    from kempf.pipeline.shooting.inflation import inflation
-
     ahead = rung.get("one_leg_ahead") or {}
     own = {n: one for n, one in rung["effects"].items() if n.partition(".")[0] == rung["added"]}
     factor = 1.0
     if by_legs and ahead:
-        own = {name: {**ahead["parameters"][name], "unit": one["unit"]} for name, one in own.items()}
-        factor = inflation(ahead["fitted_misfit"], ahead["left_out_misfit"])
+        own = {name: {**ahead["parameters"][name], "unit": one.get("unit")} for name, one in own.items()}
+        factor = inflation(ahead.get("fitted_misfit"), ahead.get("left_out_misfit"))
     return tuple(
-        Size(name.partition(".")[2], one["value"], factor * one["std"], one.get("unit") or "")
+        Size(
+            name.partition(".")[2],
+            one["value"],
+            None if one["std"] is None else factor * one["std"],
+            one.get("unit") or "",
+        )
         for name, one in own.items()
     )

@@ -39,12 +39,16 @@ class Beside:
     measured_high: float | None
     predicted: Figure
 
+    @property
+    def inside(self) -> bool | None:
+        """Whether it was measured within the interval; None where there is none."""
+        low, high = self.predicted.low, self.predicted.high
+        return None if low is None or high is None else low <= self.measured <= high
+
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        low, high = self.predicted.low, self.predicted.high
-        inside = None if low is None or high is None else low <= self.measured <= high
         measured = {"measured": self.measured, "measured_low": self.measured_low, "measured_high": self.measured_high}
-        return {"figure": self.name, **measured, **vars(self.predicted), "inside": inside}
+        return {"figure": self.name, **measured, **vars(self.predicted), "inside": self.inside}
 
 
 @dataclass(frozen=True)

@@ -63,10 +63,10 @@ class Planned:
         ]
         if self.correction.action not in ("correct", "add") or not negative:
             return ()
-        which = "overshoot " if len(negative) == 1 else "overshoots "
+        which = f"overshoot {negative[0]} is" if len(negative) == 1 else f"overshoots {', '.join(negative)} are"
         return (
-            f"{which}{', '.join(negative)} below zero: she turned back before {self.after.psi0_deg:.3g} deg from "
-            "the base course, so that the bounds may begin or end within a leg, or hold two manoeuvres",
+            f"{which} negative: she turned back before she was {self.after.psi0_deg:.3g} deg off the base course; the "
+            "bounds may cut a leg or enclose two manoeuvres",
         )
 
     def show(self) -> dict[str, Any]:

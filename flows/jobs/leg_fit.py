@@ -18,13 +18,27 @@ def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, fl
     None where that a step ahead predicts as well. The factor is `kempf.pipeline.shooting.inflation.inflation`.
     """
     ahead = _ahead(parameter_set)
-    if ahead is None or ahead["better_than_one_step"] is None:
+    if ahead is None or not taken_by_predictions(ahead):
         return None
     # by name, as JSON keeps no order; the covariance is in that of the set
     values = np.array([ahead["parameters"][name]["value"] for name in _names(parameter_set, ahead)], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
     factor = inflation(ahead.get("fitted_misfit"), ahead.get("left_out_misfit"))
-    return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
+    return values[:6], values[6:], covariance, factor
+
+
+def taken_by_predictions(ahead: Mapping[str, Any] | None) -> bool:
+    """Return whether predictions take the parameters fitted to legs.
+
+    Parameters
+    ----------
+    ahead : mapping or None
+        ``one_leg_ahead`` of a rung; None where it has none.
+    """
+    if ahead is None or ahead.get("better_than_one_step") is None:
+        return False
+    # what is not known is null in JSON
+    return bool(np.all(np.isfinite(np.array(ahead["covariance"], dtype=np.float64))))
 
 
 def by_name(parameter_set: ParameterSet) -> dict[str, tuple[float, float]]:

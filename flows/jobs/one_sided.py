@@ -1,4 +1,4 @@
-"""Figures that measured manoeuvres all have to one side of what is predicted: no scatter, but what a model lacks."""
+"""Figures that measured manoeuvres all have to one side of what is predicted."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import sqrt
 from statistics import mean, median, stdev
 
-from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
+from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
 
 #: manoeuvres, and standard errors of their mean, from which it is hardly chance that all lie to one side
 _FEWEST, _CLEAR = 4, 3.0
@@ -26,6 +26,8 @@ class OneSided:
     median_percent: float
     low_percent: float
     high_percent: float
+    #: How many of the measured ones lie in the interval of their prediction.
+    inside: int
 
     def sentence(self, words: str) -> str:
         """Say it.
@@ -38,7 +40,12 @@ class OneSided:
         return (
             f"{words}: predicted too {'large' if self.median_percent > 0.0 else 'small'} in all {self.manoeuvres} "
             f"manoeuvres, by {abs(self.median_percent):.0f} % in the median ({self.low_percent:+.0f} to "
-            f"{self.high_percent:+.0f} %): no scatter, the model lacks something"
+            f"{self.high_percent:+.0f} %); "
+            + (
+                f"{self.inside} of {self.manoeuvres} are within the interval, which allows for it"
+                if 2 * self.inside >= self.manoeuvres
+                else f"only {self.inside} of {self.manoeuvres} are within the interval: the model lacks something"
+            )
         )
 
 
@@ -50,16 +57,20 @@ def one_sided(measured: Sequence[MeasuredManoeuvre]) -> tuple[OneSided, ...]:
     measured : sequence of MeasuredManoeuvre
         To both sides: figures that change their sign with the side are compared by their size.
     """
-    by_figure: dict[str, list[float]] = {}
+    by_figure: dict[str, list[Beside]] = {}
     for manoeuvre in measured:
         for beside in manoeuvre.figures:
-            if beside.predicted.value is not None and beside.measured != 0.0:
-                by_figure.setdefault(beside.name, []).append(abs(beside.predicted.value) / abs(beside.measured) - 1.0)
-    return tuple(
-        OneSided(name, len(errors), *(100.0 * error for error in (median(errors), min(errors), max(errors))))
-        for name, errors in by_figure.items()
-        if len(errors) >= _FEWEST and _clearly_one_sided(errors)
-    )
+            # of opposite signs neither is the larger one
+            if beside.predicted.value is not None and beside.predicted.value * beside.measured > 0.0:
+                by_figure.setdefault(beside.name, []).append(beside)
+    found = []
+    for name, every in by_figure.items():
+        errors = [abs(one.predicted.value or 0.0) / abs(one.measured) - 1.0 for one in every]
+        if len(errors) >= _FEWEST and _clearly_one_sided(errors):
+            inside = sum(one.inside is True for one in every)
+            middle, low, high = (100.0 * error for error in (median(errors), min(errors), max(errors)))
+            found.append(OneSided(name, len(errors), middle, low, high, inside))
+    return tuple(found)
 
 
 def _clearly_one_sided(errors: Sequence[float]) -> bool:

@@ -10,6 +10,7 @@ import numpy as np
 from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.carried import carried, sentences
 from kempf.pipeline.steering.motion import ShipEffects
@@ -37,7 +38,8 @@ _LEAST = {"wind_m_s2": 1.0, "current_m_s": 1.0}
 _LEAST_OF_A_MEASUREMENT = 0.02
 
 _FITTED_TO_LEGS = (
-    "parameters are those fitted to legs, which predict manoeuvres better than the likelihood's (kempf params show)"
+    "parameters are those fitted to legs, which predict manoeuvres better than the likelihood's (kempf params show); "
+    "noise levels are the likelihood's"
 )
 
 
@@ -61,22 +63,31 @@ class ShipOfSet:
     noise: NoiseLevels
     #: What a linear model about a straight course has not, or not wholly, of the effects.
     remarks: tuple[str, ...]
-    #: What speaks against the parameters: of the likelihood's what the set says, of those fitted to legs that they are.
+    #: Whether the parameters are those fitted to legs.
+    by_legs: bool
+    #: What the set says against the parameters; of those fitted to legs that they are, and what is implausible about
+    #: them in the place of what is about the likelihood's.
     of_parameters: tuple[str, ...]
     #: What speaks against these numbers: the above, what was assumed, and the remarks.
     warnings: tuple[str, ...]
 
     @property
+    def parameters(self) -> tuple[StoredValue, ...]:
+        """The parameters of hull and effects, in the order of ``covariance``."""
+        held = {p.name: p for p in self.parameter_set.parameters}
+        names = [*HULL_PARAMETERS, *(self.effects.model.names if self.effects is not None else ())]
+        if not self.by_legs:
+            return tuple(held[name] for name in names)
+        values = [*self.hull.array().tolist(), *(self.effects.values.tolist() if self.effects is not None else ())]
+        stds = np.sqrt(np.diag(self.covariance)).tolist()
+        return tuple(
+            replace(held[name], value=value, std=std) for name, value, std in zip(names, values, stds, strict=True)
+        )
+
+    @property
     def effect_parameters(self) -> tuple[StoredValue, ...]:
         """The parameters of the effects, in their order."""
-        if self.effects is None:
-            return ()
-        held = {p.name: p for p in self.parameter_set.parameters}
-        stds = np.sqrt(np.diag(self.covariance)[len(HULL_PARAMETERS) :])
-        return tuple(
-            replace(held[name], value=float(value), std=float(std) if np.isfinite(std) else None)
-            for name, value, std in zip(self.effects.model.names, self.effects.values, stds, strict=True)
-        )
+        return self.parameters[len(HULL_PARAMETERS) :]
 
 
 def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: float | None = None) -> ShipOfSet:
@@ -115,7 +126,7 @@ def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: fl
         effects = replace(effects, values=legs[1])
     remarks = sentences(carried(hull, effects, float(speed), arm or 0.0))
     noise, assumed = _noise(parameter_set, spec)
-    of_parameters = parameter_set.warnings if legs is None else (_FITTED_TO_LEGS,)
+    of_parameters = parameter_set.warnings if legs is None else _of_legs(parameter_set, legs)
     warnings = [*of_parameters, *assumed, *remarks]
     if not parameter_set.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {parameter_set.convergence.get('reason')}")
@@ -124,8 +135,22 @@ def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: fl
         covariance = legs[3] ** 2 * legs[2]
     numbers = (float(speed), arm or 0.0, profile.length_m)
     return ShipOfSet(
-        parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks, of_parameters, tuple(warnings)
+        *(parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks),
+        by_legs=legs is not None,
+        of_parameters=of_parameters,
+        warnings=tuple(warnings),
     )
+
+
+def _of_legs(parameter_set: ParameterSet, legs: tuple[Float, Float, Float, float]) -> tuple[str, ...]:
+    """Return the warnings of a set with what is implausible about its hull as fitted to legs."""
+    held = {p.name: p for p in parameter_set.parameters}
+    hull = np.array([held[name].value for name in HULL_PARAMETERS], dtype=np.float64)
+    std = np.array([np.nan if held[name].std is None else held[name].std for name in HULL_PARAMETERS])
+    of_likelihood = plausibility_warnings(hull, std, {})
+    own = legs[3] * np.sqrt(np.diag(legs[2]))[: len(HULL_PARAMETERS)]
+    kept = (warning for warning in parameter_set.warnings if warning not in of_likelihood)
+    return (_FITTED_TO_LEGS, *plausibility_warnings(legs[0], own, {}), *kept)
 
 
 def _effects(parameter_set: ParameterSet, profile: VesselProfile) -> ShipEffects | None:

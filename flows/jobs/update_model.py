@@ -16,6 +16,7 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.errors_of_fit import errors_of
+from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.out_of_date import command_for
 from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.standing_model import SEARCH, Own, goes_by_load, inputs_of, known_effects, stored_model
@@ -301,8 +302,15 @@ def _rung(update: Updated, fit: PooledFit, before: ParameterSet, number: int) ->
         name: float(np.exp(_mean(np.log(first["disturbance_intensity"][name]), number, np.log(value), count)))
         for name, value in new_rung["disturbance_intensity"].items()
     }
+    legs, values = fitted_to_legs(before), fit.values.copy()
+    by_legs = []
+    if legs is not None:
+        # those of the set before: legs are fitted where all manoeuvres are
+        values[fit.model.of_ship] = legs[1]
+        by_legs = [free_run_of(filtered, legs[0], values) for filtered in fit.runs]
     return {
         **new_rung,
+        "free_run_fitted_to_legs": {free_run.name: free_run.relative_error for free_run in by_legs},
         "in_sample_error": _mean(first["in_sample_error"], number, new_rung["in_sample_error"], count),
         "held_out_error": first["held_out_error"],
         "foreseen": {free_run.name: free_run.relative_error for free_run in foreseen},

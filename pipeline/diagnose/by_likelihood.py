@@ -172,18 +172,13 @@ def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
             # a term of a series goes wrong beyond the logs first, and of a model that lacks something the likelihood
             # does not choose the form
             continue
-        in_place = by_prediction and _predicts_alike(ladder, below, step, last.added)
-        without = ladder.in_place(step, steps) if in_place else ladder.without(step.added, steps)
+        ahead = ladder.ahead(below, last.added) if by_prediction else None
+        alike_ahead = step.ahead is not None and ahead is not None and not worsens(step.ahead, ahead)
+        without = ladder.in_place(step, steps, ahead) if alike_ahead else ladder.without(step.added, steps)
         gained = 2.0 * (last.fit.log_likelihood - without[-1].fit.log_likelihood)
         if gained - price_of(step.added, last.fit) < BIC_SAVING and not _worse(last.ahead, without[-1].ahead):
             return without
     return steps
-
-
-def _predicts_alike(ladder: Ladder, below: Step, step: Step, effect: Effect) -> bool:
-    """Return whether an effect in the place of the one of a step predicts legs alike."""
-    ahead = ladder.ahead(below, effect)
-    return step.ahead is not None and ahead is not None and not worsens(step.ahead, ahead)
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:

@@ -13,8 +13,6 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-import numpy as np
-
 from kempf.pipeline.diagnose.by_likelihood import certain_ones
 from kempf.pipeline.diagnose.by_prediction import predicting_better
 from kempf.pipeline.diagnose.final_sizes import Size, final_sizes
@@ -32,7 +30,7 @@ from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, shooting_range
+from kempf.pipeline.shooting.ahead import Ahead, shooting_range
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
 
@@ -106,8 +104,9 @@ def diagnose(
         shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
     listener.begins(f"screening {len(effects)} effects")
     screened = screen(base, effects, workers, listener)
-    rungs = tuple(step_of(fit, held, _begun(shooting, fit), workers) for fit in fits[:-1])
-    first = make_step(base, None, (), (), held, screened, workers, _begun(shooting, base))
+    models: Sequence[Ahead | None] = [None] * len(fits) if shooting is None else shooting.way(fits)
+    rungs = tuple(step_of(fit, held, ahead, workers) for fit, ahead in zip(fits[:-1], models[:-1], strict=True))
+    first = make_step(base, None, (), (), held, screened, workers, models[-1])
     before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
     ladder = Ladder(shooting, effects, held, workers, settings, listener, base)
     steps = predicting_better(ladder, [first])
@@ -148,14 +147,3 @@ def _claimed(steps: Sequence[Step]) -> int:
     though something else may be missing too; what only the likelihood sees may imitate that.
     """
     return max(number for number, step in enumerate(steps) if number == 0 or step.stability is not None) + 1
-
-
-def _begun(shooting: ShootingRange | None, base: PooledFit) -> Ahead | None:
-    """Return the model that a diagnosis begins from one leg ahead."""
-    if shooting is None:
-        return None
-    ahead = shooting.plain
-    ship = base.ship
-    if ship.model.effects:
-        ahead = shooting.refitted(ship.model, np.concatenate([ahead.fit.hull, ship.values]), ahead)
-    return shooting.beside(ahead, base)

@@ -88,15 +88,17 @@ class Ladder:
         """Climb the ladder again without an effect; what was refused on the way stays listed."""
         self.listener.begins(f"{idle.title} is no longer needed")
         kept = [step for step in steps[1:] if step.added is not None and step.added.name != idle.name]
-        return self._climbed([steps[0]], kept, steps, idle)
+        return self._climbed([steps[0]], kept, steps, {idle.name: None})
 
-    def in_place(self, step: Step, steps: Sequence[Step]) -> list[Step]:
+    def in_place(self, step: Step, steps: Sequence[Step], ahead: Ahead | None) -> list[Step]:
         """Climb the ladder again with the last effect in the place of the one of a rung, which stays in its set.
 
         Parameters
         ----------
         step : Step
             One of ``steps``, chosen by predictions: what takes its place keeps its stability.
+        ahead : Ahead or None
+            The model below that rung with the last effect, one leg ahead.
         """
         last = steps[-1].added
         assert last is not None
@@ -107,20 +109,39 @@ class Ladder:
         candidate = score(below[-1].fit, last, self.workers)
         confirmation = self.confirmed(below[-1].fit, self.unseen(below[-1]), candidate)
         others = tuple(pair for pair in step.chosen_from if pair[0].effect.name != last.name)
-        ahead = self.ahead(below[-1], last)
-        again = self.stepped(((candidate, confirmation), *others), step.refused, ahead, step.stability)
-        together = tuple(last.name if name == step.added.name else name for name in step.together)
-        return self._climbed([*below, replace(again, together=together)], kept, steps, step.added)
+        refused = tuple(pair for pair in step.refused if pair[0].effect.name != last.name)
+        again = self.stepped(((candidate, confirmation), *others), refused, ahead, step.stability)
+        names = {step.added.name: last.name}
+        below = [replace(rung, together=_renamed(rung.together, names)) for rung in below]
+        again = replace(again, together=_renamed(step.together, names))
+        return self._climbed([*below, again], kept, steps, names)
 
-    def _climbed(self, rungs: list[Step], kept: Sequence[Step], steps: Sequence[Step], gone: Effect) -> list[Step]:
-        """Put the effects of rungs on others once more."""
-        refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
+    def _climbed(
+        self, rungs: list[Step], kept: Sequence[Step], steps: Sequence[Step], names: Mapping[str, str | None]
+    ) -> list[Step]:
+        """Put the effects of rungs on others once more.
+
+        Parameters
+        ----------
+        names : mapping of str to (str or None)
+            What takes the place of an effect that is gone, if anything does.
+        """
+        chosen = {candidate.effect.name for rung in rungs for candidate, _ in rung.chosen_from}
+        chosen |= {step.added.name for step in kept if step.added is not None}
+        refused = [
+            pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused) if pair[0].effect.name not in chosen
+        ]
         for step in kept:
             assert step.added is not None
             candidate = score(rungs[-1].fit, step.added, self.workers)
             confirmation = self.confirmed(rungs[-1].fit, self.unseen(rungs[-1]), candidate)
-            others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
             ahead = self.ahead(rungs[-1], step.added)
-            again = self.stepped(((candidate, confirmation),), others, ahead, step.stability)
-            rungs.append(replace(again, together=tuple(name for name in step.together if name != gone.name)))
+            again = self.stepped(((candidate, confirmation),), tuple(refused), ahead, step.stability)
+            rungs.append(replace(again, together=_renamed(step.together, names)))
         return rungs
+
+
+def _renamed(together: Sequence[str], names: Mapping[str, str | None]) -> tuple[str, ...]:
+    """Return the effects that belong together with other names; one alone belongs with nothing."""
+    now = tuple(dict.fromkeys(name for old in together if (name := names.get(old, old)) is not None))
+    return now if len(now) > 1 else ()

@@ -141,12 +141,15 @@ def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Fi
     each = [_samples([model]) for model in models]
     figures = {}
     for name, values in _samples(models).items():
-        there = [of_model[name][np.isfinite(of_model[name])] for of_model in each if name in of_model]
+        of_each = [of_model[name] for of_model in each if name in of_model]
+        there = [drawn[np.isfinite(drawn)] for drawn in of_each]
+        # a model few of whose ships come to a figure has no interval of it
+        many = [kept for kept, drawn in zip(there, of_each, strict=True) if kept.size >= ENOUGH * drawn.size]
         value = sailed.figures[name] if sailed is not None else np.nan
-        if sum(kept.size for kept in there) < ENOUGH * values.size or not np.isfinite(value):
+        if not many or sum(kept.size for kept in there) < ENOUGH * values.size or not np.isfinite(value):
             figures[name] = Figure(None, None, None)
         else:
-            ends = np.array([np.percentile(kept, [_TAIL, 100.0 - _TAIL]) for kept in there if kept.size])
+            ends = np.array([np.percentile(kept, [_TAIL, 100.0 - _TAIL]) for kept in many])
             figures[name] = Figure(float(value), float(ends[:, 0].min()), float(ends[:, 1].max()))
     return figures
 

@@ -179,7 +179,8 @@ def _start(chain: Chain, first: int, settings: SegmentSettings, *, centre: float
         return "unknown"
     away = float(chain.heading[first]) - centre
     slack = float(np.deg2rad(settings.switching_slack_deg))
-    if abs(away + leg.side * change) <= max(settings.switching_scatter * change, slack):
+    # nearer to the opposite switching heading than to K0, however far switching headings may scatter
+    if abs(away + leg.side * change) <= max(min(settings.switching_scatter, 0.5) * change, slack):
         return "switching"
     next_leg = chain.legs[first + 1]
     offset, amplitude = (leg.rudder + next_leg.rudder) / 2, abs(leg.rudder - next_leg.rudder) / 2

@@ -147,6 +147,29 @@ class ShootingRange:
         _, shared = min(tried, key=lambda pair: pair[0])
         return self.refitted(model, shared, base)
 
+    def way(self, fits: Sequence[PooledFit]) -> tuple[Ahead, ...]:
+        """Return the models of fits by likelihood one leg ahead.
+
+        Each is begun from the sizes that the likelihood gives its effects and, as in a diagnosis, from the model before
+        it: where something is lacking, the former may lie beyond a hill.
+
+        Parameters
+        ----------
+        fits : sequence of PooledFit
+            Of the fitted manoeuvres, each with one effect more than the one before.
+        """
+        models: list[Ahead] = []
+        for fit in fits:
+            near = models[-1] if models else self.plain
+            ship = fit.ship
+            if ship.model.effects:
+                begun = [self.refitted(ship.model, np.concatenate([near.fit.hull, ship.values]), near)]
+                if len(ship.model.effects) == len(near.model.effects) + 1:
+                    begun += [model for model in [self.with_effect(near, ship.model.effects[-1])] if model is not None]
+                near = min(begun, key=lambda model: model.fit.cost)
+            models.append(self.beside(near, fit))
+        return tuple(models)
+
     def with_effects(self, base: Ahead, effects: Sequence[Effect], shared: Float) -> Ahead:
         """Fit a model with several effects more.
 
@@ -230,10 +253,7 @@ def shooting_range(
 
 
 def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Executor) -> tuple[Ahead | None, ...]:
-    """Return models one leg ahead.
-
-    Each is begun from the sizes that the likelihood gives its effects and, as in a diagnosis, from the model before it:
-    where something is lacking, the former may lie beyond a hill.
+    """Return models one leg ahead, see `ShootingRange.way`; None where a single manoeuvre is fitted.
 
     Parameters
     ----------
@@ -245,18 +265,7 @@ def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Execut
     first = fits[0]
     if len(first.runs) < 2:
         return (None,) * len(fits)
-    shooting = shooting_range([filtered.run for filtered in first.runs], held, first.runs[0].spec, workers)
-    models: list[Ahead] = []
-    for fit in fits:
-        near = models[-1] if models else shooting.plain
-        ship = fit.ship
-        if ship.model.effects:
-            begun = [shooting.refitted(ship.model, np.concatenate([near.fit.hull, ship.values]), near)]
-            if len(ship.model.effects) == len(near.model.effects) + 1:
-                begun += [model for model in [shooting.with_effect(near, ship.model.effects[-1])] if model is not None]
-            near = min(begun, key=lambda model: model.fit.cost)
-        models.append(shooting.beside(near, fit))
-    return tuple(models)
+    return shooting_range([filtered.run for filtered in first.runs], held, first.runs[0].spec, workers).way(fits)
 
 
 def _sizes(effect: Effect) -> list[Float]:

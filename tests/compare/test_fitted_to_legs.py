@@ -31,6 +31,11 @@ def test_a_model_that_lacks_something_is_drawn_as_it_predicts(late_added: Path) 
         assert _error(free, sample) == pytest.approx(known["free_run_error_percent"]["mean"])
         assert _error(legs, sample) == pytest.approx(known["free_run_error_percent_fitted_to_legs"]["mean"])
     assert _error(legs, "held_out") < _error(free, "held_out")
+    # a threshold is put to what is drawn
+    assert free["judged"]["free_run_error_percent"] == pytest.approx(_error(free, "held_out"))
+    assert legs["judged"]["free_run_error_percent"] == pytest.approx(_error(legs, "held_out")), "one run is its median"
+    horizons = [{one["overshoot_horizon"] for one in document["runs"]} for document in (free, legs)]
+    assert horizons == [{"free"}, {"legs"}]
 
 
 def test_of_a_model_that_predicts_by_likelihood_it_is_the_free_run(late_added: Path) -> None:

@@ -402,7 +402,7 @@ def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(
         made = ladder.confirmed(steps[0].fit, ladder.unseen(steps[0]), lag)
         step = ladder.stepped(((lag, made),), (), ladder.ahead(steps[0], lag.effect), stability)
         ladder.probe = step.fit
-        return [*steps, step]
+        return [*steps, replace(step, together=("rudder_lag", "wind_force") if stability else ())]
 
     # the lag keeps several standard errors beside the dead time
     ship = sailed("dead_time", strength=1, seed=4)
@@ -412,6 +412,7 @@ def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(
     assert step.added is not None and step.added.name == "dead_time"
     # in the place of what predictions chose, which stays in the set: the claim is not lost with the name
     assert step.stability == stability
+    assert step.together == (("dead_time", "wind_force") if stability else ())
     others = [candidate.effect.name for candidate, _ in step.chosen_from[1:]]
     assert ("rudder_lag" in others) is (stability is not None)
     tau, std = value_of(found, "dead_time.tau")

@@ -97,9 +97,12 @@ def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse
     before = history.standing(warehouse, "mariner")
     bounds = zigzag.start_utc_ns + 7 * SECOND_NS, zigzag.end_utc_ns
     planned = plan_for(warehouse, zigzag.segment_id, "correct", "she was still turning", bounds)
+    # the approach that is left counts as one: the first leg has no overshoot
+    assert len(planned.after.overshoots_deg) == len(zigzag.overshoots_deg)
+    assert planned.after.overshoots_deg == pytest.approx(zigzag.overshoots_deg, abs=0.1)
     assert planned.doubts == () and planned.show()["doubts"] == []
     (doubt,) = replace(planned, after=replace(planned.after, overshoots_deg=(3.0, -1.8))).doubts
-    assert doubt.startswith("overshoot 2 (-1.8 deg) below zero: she turned back before ")
+    assert doubt.startswith("overshoot 2 (-1.8 deg) is negative: she turned back before she was ")
     planned.store(warehouse)
     (corrected,) = segments.current(warehouse, "mariner")
     assert (corrected.start_utc_ns, corrected.end_utc_ns) == bounds and corrected == planned.after

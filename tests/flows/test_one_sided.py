@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
@@ -11,8 +13,16 @@ from kempf.pipeline.manoeuvre.prediction import Figure
 
 def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> MeasuredManoeuvre:
     """One that was sailed to starboard and to port in turn: name, measured and predicted of each figure."""
-    every = tuple(Beside(name, there, None, None, Figure(value, None, None)) for name, there, value in figures)
+    every = tuple(Beside(name, there, None, None, within(value, 0.05)) for name, there, value in figures)
     return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, "held_out", every)
+
+
+def within(value: float | None, share: float) -> Figure:
+    """A predicted value with an interval of this share of it to both sides."""
+    if value is None:
+        return Figure(None, None, None)
+    low, high = sorted(((1.0 - share) * value, (1.0 + share) * value))
+    return Figure(value, low, high)
 
 
 def rates(factors: list[float]) -> list[MeasuredManoeuvre]:
@@ -29,9 +39,23 @@ def test_what_is_too_large_in_all_is_said_whatever_the_side() -> None:
     shown = (found.median_percent, found.low_percent, found.high_percent)
     assert shown == pytest.approx((17.0, 14.0, 33.0))
     assert found.sentence("steady yaw rate") == (
-        "steady yaw rate: predicted too large in all 5 manoeuvres, by 17 % in the median (+14 to +33 %): no scatter, "
-        "the model lacks something"
+        "steady yaw rate: predicted too large in all 5 manoeuvres, by 17 % in the median (+14 to +33 %); only 0 of 5 "
+        "are within the interval: the model lacks something"
     )
+
+
+def test_errors_that_the_intervals_allow_for_are_said_to_be_such() -> None:
+    wide = [
+        replace(one, figures=tuple(replace(f, predicted=replace(f.predicted, low=-9.0, high=9.0)) for f in one.figures))
+        for one in rates([1.14, 1.2, 1.17, 1.33])
+    ]
+    (found,) = one_sided(wide)
+    assert found.sentence("steady yaw rate").endswith("4 of 4 are within the interval, which allows for it")
+
+
+def test_of_opposite_signs_neither_is_the_larger() -> None:
+    figures = [("residual_yaw_rate_deg_s", -2.0, 1.0)] * 5
+    assert one_sided([manoeuvre(number, figure) for number, figure in enumerate(figures)]) == ()
 
 
 @pytest.mark.parametrize(

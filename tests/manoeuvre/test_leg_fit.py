@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
 from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.ship_model import ship_of_set
@@ -15,6 +16,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.export import as_control, linear
 from tests.late import VESSEL
 
 NAMES = ("a11", "a12", "a21", "a22", "b1", "b2", "wind_force.c", "wind_force.k", "cross_flow_drag.c")
@@ -59,7 +61,20 @@ def test_steering_and_exports_take_what_predictions_take(late_added: Path) -> No
     ship = ship_of_set(warehouse, plain)
     assert np.array_equal(ship.hull.array(), hull)
     assert np.array_equal(ship.covariance, factor**2 * covariance)
-    assert ship.of_parameters == ship.warnings[:1] and "fitted to legs" in ship.warnings[0]
+    assert "fitted to legs" in ship.of_parameters[0] and ship.warnings[0] == ship.of_parameters[0]
+    assert [p.value for p in ship.parameters] == hull.tolist()
+    assert [p.std for p in ship.parameters] == pytest.approx(np.sqrt(np.diag(ship.covariance)).tolist())
+    # what the file says of the parameters is what its matrices were made of
+    module: dict[str, Any] = {}
+    exec(as_control(linear(ship, 1.0, 0.0)), module)  # noqa: S102 - our own
+    assert list(module["PARAMETERS"].values()) == hull.tolist()
+    assert module["continuous"].A[0, 0] == pytest.approx(module["PARAMETERS"]["a11"] * ship.speed_m_s)
+    errors = list(module["STANDARD_ERRORS"].values())
+    assert np.sqrt(np.diag(module["COVARIANCE"])).tolist() == pytest.approx(errors)
+    # what the instruments did is no matter of the hull's parameters
+    assert set(plain.warnings) - set(ship.of_parameters) <= {
+        w for w in plain.warnings if "not determined" in w or ">" in w
+    }
     right = ship_of_set(warehouse, with_lag)
     values = {p.name: p.value for p in with_lag.parameters}
     assert right.hull.array().tolist() == [values[name] for name in HULL_PARAMETERS]

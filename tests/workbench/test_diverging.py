@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import isnan
+from typing import Any
 
 import numpy as np
 
@@ -26,3 +27,32 @@ def test_it_is_called_so() -> None:
     assert [in_words(one.free.held_out) for one in (diverging, alone)] == ["diverges", "-"]
     assert in_words(alone.free.fitted) == "12.5"
     assert (_share(float("nan")), _share(0.125)) == ("divergence", "12.5")
+
+
+def test_what_is_not_known_of_a_rung_stops_no_table() -> None:
+    ahead = {
+        "better_than_one_step": {"falls_by": 0.5},
+        "covariance": [[0.01]],
+        "fitted_misfit": 1.0,
+        "left_out_misfit": 4.0,
+        "parameters": {"rudder_lag.tau": {"value": 2.0, "std": None}},
+        **{f"{sample}_percent": {"seg-1": None} for sample in ("fitted", "left_out", "held_out")},
+    }
+    rung: dict[str, Any] = {
+        "added": "rudder_lag",
+        "effects": {"rudder_lag.tau": {"value": 1.0, "std": 0.1, "unit": "s"}},
+        "in_sample": {"seg-1": {}, "seg-2": {}},
+        "in_sample_error": 0.5,
+        "held_out": {},
+        "held_out_error": None,
+        "one_leg_ahead": ahead,
+        "free_run_fitted_to_legs": {"seg-1": 0.25},
+    }
+    (one,) = compared([rung])
+    (tau,) = one.sizes
+    assert one.by_legs and (tau.value, tau.std) == (2.0, None)
+    # of a manoeuvre that came after the fit to legs there is none
+    assert (in_words(one.free.fitted), in_words(one.leg.fitted), in_words(one.free.held_out)) == ("25", "diverges", "-")
+    # predictions do not take what has no covariance, so that it is not shown
+    (plain,) = compared([{**rung, "one_leg_ahead": {**ahead, "covariance": [[None]]}}])
+    assert not plain.by_legs and (plain.sizes[0].value, in_words(plain.free.fitted)) == (1.0, "50")

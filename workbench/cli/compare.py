@@ -188,13 +188,16 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     if inside:
         shares = [f"{_CHANNELS[name]} {100 * inside[name]['share']:.1f} %" for name in there if name in inside]
         click.echo(f"  inside the 95 % interval: {', '.join(shares)}")
-    click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(mean['free_run_error_percent'])} %")
-    if mean["free_run_error_percent_fitted_to_legs"]:
-        by_legs = _with_error(mean["free_run_error_percent_fitted_to_legs"])
-        click.echo(
-            f"  the same with the parameters fitted to legs, which predictions of manoeuvres take (--horizon legs): "
-            f"{by_legs} %"
-        )
+    likelihood, legs = mean["free_run_error_percent"], mean["free_run_error_percent_fitted_to_legs"]
+    if not legs:
+        click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(likelihood)} %")
+        return
+    by_likelihood = f"{_with_error(likelihood)} % with the likelihood's parameters"
+    middle = "diverges" if legs["median"] is None else f"{legs['median']:.2f} %"
+    click.echo(
+        f"  free-run error (100 - fit %, mean over channels): {by_likelihood}, {_with_error(legs)} %, median "
+        f"{middle}, with those fitted to legs (--horizon legs), which predictions of manoeuvres take"
+    )
 
 
 def _print_where(title: str, where: dict[str, Any]) -> None:

@@ -169,7 +169,7 @@ def _words(planned: Planned) -> str:
     following = planned.following
     current = ", the current one among them" if following.current else ""
     superseded = f"{counted(len(following.set_ids), 'parameter set')} of {following.vessel!r} superseded{current}"
-    return "; ".join((f"{sentence}: {superseded}", *planned.doubts))
+    return "\n".join((f"{sentence}: {superseded}", *(f"  warning: {doubt}" for doubt in planned.doubts)))
 
 
 def _described(segment: Segment) -> str:

@@ -154,13 +154,15 @@ def _print_legs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
     free = by_manoeuvre(before), by_manoeuvre(after)
     rows = []
     for sample, key, leg in (("fitted", "in_sample", "left_out_percent"), ("held out", "held_out", "held_out_percent")):
-        legs = [rung["one_leg_ahead"][leg] for rung in (before, after)]
+        legs = [(rung.get("one_leg_ahead") or {}).get(leg) or {} for rung in (before, after)]
         for name in before[key]:
             if name in after[key]:
-                cells = [*(errors.get(name) for errors in legs), *(errors.get(name, nan) for errors in free)]
-                rows.append([name, sample, *(in_words(nan if error is None else error) for error in cells)])
+                # null where it diverges, missing of a manoeuvre that came later
+                ahead = [nan if errors.get(name, 0.0) is None else errors.get(name) for errors in legs]
+                rows.append([name, sample, *(in_words(error) for error in (*ahead, *(f.get(name) for f in free)))])
     head = ["manoeuvre", "sample", "leg", "after", "free run", "after"]
-    print_table(head, rows, "Error, % of the motion, before and after; a leg of a fitted one by the others' parameters")
+    title = "Error, % of the motion, before and after; one leg ahead, fitted manoeuvres are predicted from the others"
+    print_table(head, rows, title)
 
 
 def _scaled(value: float | None, factor: float) -> float | None:

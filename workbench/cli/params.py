@@ -62,6 +62,7 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_json: bool) -> None:
     """Show a parameter set whole: an id, a unique beginning of one, an alias; default: current."""
     from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.leg_fit import by_name
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import tell_set
@@ -81,7 +82,8 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in parameter_set.discrete],
         f"Discrete, eq. (17), at {number(parameter_set.convergence.get('speed_m_s'))} m/s and a step of "
-        f"{number(parameter_set.convergence.get('step_s'))} s",
+        f"{number(parameter_set.convergence.get('step_s'))} s"
+        + (", by the likelihood's parameters" if by_name(parameter_set) else ""),
     )
     effects = parameter_set.model_spec.get("effects")
     if effects:
@@ -104,6 +106,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     without dimension too, with K' = K L/V and T' = T V/L of their hulls.
     """
     from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.leg_fit import by_name
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
@@ -120,6 +123,12 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     if one.vessel != other.vessel and document["nondimensional"] is not None:
         words = "Without their dimension, as ships of other sizes are compared; K' and T' of the hull alone:"
         print_table(head, _difference_rows(document["nondimensional"]), words)
+    for each in (one, other):
+        if by_name(each):
+            click.echo(
+                f"  {each.parameter_set_id}: by the likelihood's parameters; predictions take those fitted to legs "
+                "(kempf params show)"
+            )
 
 
 def _difference_rows(differences: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:

@@ -114,7 +114,8 @@ def ladder(content: ReportContent) -> list[Block]:
     drawn = _picture(
         diagnosis_ladder.draw_ladder(models, first),
         diagnosis_ladder.describe_ladder(models, first),
-        f"Free-run error by manoeuvre and its {middle}, far ones at the edge; disturbances that each model needs.",
+        f"Free-run error by manoeuvre and its {middle} (beyond three times the largest {middle} at the edge); "
+        "disturbances that each model needs.",
     )
     rows = []
     for number, model in enumerate(models):

@@ -111,8 +111,8 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequenc
         "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
         "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
-        "unexplained": f"The model has {listed(has)}; beside {'it' if len(has) == 1 else 'them'} a systematic misfit "
-        "remains that no known effect accounts for."
+        "unexplained": f"Even with {listed(has)} in the model a systematic misfit remains that no known effect "
+        "accounts for."
         if has
         else f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
     }[verdict]

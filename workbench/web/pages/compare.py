@@ -88,11 +88,9 @@ def _runs(desk: Desk, first: ParameterSet, second: ParameterSet) -> dict[str, An
     state = fleet_state(desk.warehouse, [first.vessel])[first.vessel]
     # both by the same kind of fit
     asked = next((horizon for horizon in map(free_horizon, (first, second)) if horizon == "legs"), None)
-    keys = {
-        one.parameter_set_id: key_of(state, one.parameter_set_id, free_horizon(one, asked)) for one in (first, second)
-    }
-    predictions = {name: kept(desk.state, key) for name, key in keys.items()}
-    lacking = [name for name, prediction in predictions.items() if prediction is None]
+    horizons = {one.parameter_set_id: free_horizon(one, asked) for one in (first, second)}
+    predictions = {name: kept(desk.state, key_of(state, name, horizon)) for name, horizon in horizons.items()}
+    lacking = {name: horizons[name] for name, prediction in predictions.items() if prediction is None}
     if lacking:
         return {"lacking": lacking, "rows": []}
     here, there = (
@@ -104,4 +102,4 @@ def _runs(desk: Desk, first: ParameterSet, second: ParameterSet) -> dict[str, An
         {"first": here[name], "second": there[name], "segment_id": name, "start": here[name]["start"]}
         for name in sorted(here.keys() & there.keys(), key=lambda name: str(here[name]["start"]))
     ]
-    return {"lacking": [], "rows": rows}
+    return {"lacking": {}, "rows": rows}
