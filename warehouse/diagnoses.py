@@ -134,8 +134,17 @@ def by_vessel(warehouse: Warehouse) -> dict[str, list[StoredDiagnosis]]:
 
 
 def newest(warehouse: Warehouse) -> dict[str, StoredDiagnosis]:
-    """Return the diagnosis of every vessel that has one: that of her newest manoeuvres, of several the last by id."""
-    return {vessel: every[-1] for vessel, every in by_vessel(warehouse).items()}
+    """Return the diagnosis of every vessel that has one: that of her newest manoeuvres.
+
+    Of several it is the one that began from the fewest effects, which says what the plain model lacks; then the last by
+    id.
+    """
+    return {vessel: max(every, key=_newest) for vessel, every in by_vessel(warehouse).items()}
+
+
+def _newest(diagnosis: StoredDiagnosis) -> tuple[int, int, str]:
+    began = (diagnosis.inputs.get("model") or {}).get("effects") or ()
+    return diagnosis.start_utc_ns, -len(began), diagnosis.diagnosis_id
 
 
 def _stored(r: Mapping[str, Any]) -> StoredDiagnosis:

@@ -226,6 +226,6 @@ def _no_vessel(vessel: str, known: list[str]) -> NotFound:
     return NotFound(
         "no_vessel",
         f"There is no vessel {vessel!r}; known: {', '.join(known) or 'none'}.",
-        "Give one of these with --vessel, or ingest her logs with `kempf ingest PATH... --vessel NAME`.",
+        "Give one of these with --vessel, or ingest her logs with `kempf ingest PATH... --vessel NAME --new-vessel`.",
         {"vessel": vessel, "known": known},
     )

@@ -16,6 +16,8 @@ from kempf.flows.jobs.leg_fit import taken_by_predictions
 from kempf.pipeline.shooting.inflation import inflation
 from kempf.workbench.terminal import number
 
+#: percent of the motion from which a free run has left the measured course
+_LOST = 100.0
 #: what is said beside free runs and sizes of `Rung.by_legs`
 BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
 
@@ -53,6 +55,8 @@ class Rung:
     free: Errors
     #: Of the effect that was added.
     sizes: tuple[Size, ...]
+    #: How many free runs leave the measured course altogether, and of how many, where they are by legs.
+    off: tuple[int, int] = (0, 0)
 
 
 def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
@@ -65,7 +69,25 @@ def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
     """
     last: Mapping[str, Any] = rungs[-1] if rungs else {}
     by_legs = bool(last.get("effects")) and taken_by_predictions(last.get("one_leg_ahead"))
-    return [Rung(by_legs, _leg(rung), _free(rung, by_legs=by_legs), _sizes(rung, by_legs=by_legs)) for rung in rungs]
+    return [
+        Rung(
+            by_legs,
+            _leg(rung),
+            _free(rung, by_legs=by_legs),
+            _sizes(rung, by_legs=by_legs),
+            _off(rung) if by_legs else (0, 0),
+        )
+        for rung in rungs
+    ]
+
+
+def remarks(rungs: Sequence[Rung]) -> list[str]:
+    """Return what is to be known of free runs and sizes of rungs, sentences without a full stop."""
+    if not rungs or not rungs[-1].by_legs:
+        return []
+    off, many = rungs[-1].off
+    lost = f"{off} of {many} free runs with the last model leave the measured course altogether"
+    return [BY_LEGS, *([lost] if off else [])]
 
 
 def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
@@ -79,6 +101,11 @@ def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
 def in_words(error: float | None) -> str:
     """Return an error as people read it."""
     return "-" if error is None else "diverges" if isnan(error) else number(error, 3)
+
+
+def _off(rung: Mapping[str, Any]) -> tuple[int, int]:
+    errors = list(by_manoeuvre(rung).values())
+    return sum(not error < _LOST for error in errors), len(errors)
 
 
 def _leg(rung: Mapping[str, Any]) -> Errors:

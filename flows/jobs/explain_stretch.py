@@ -54,6 +54,7 @@ def explain_stretch(
     end_utc_ns: int,
     set_id: str | None = None,
     progress: Progress = silent,
+    segment_id: str | None = None,
 ) -> ExplainedStretch:
     """Score every effect of the catalogue that a model has not on a stretch of one manoeuvre.
 
@@ -63,20 +64,23 @@ def explain_stretch(
         The stretch, UTC nanoseconds, both ends included.
     set_id : str, optional
         Model whose errors are looked at; by default the vessel's current set.
+    segment_id : str, optional
+        Beginning of the id of the manoeuvre, where logs share their instants.
 
     Raises
     ------
     UsageError
         ``window_empty``, ``stretch_over_several``: it reaches over two manoeuvres, whose noise is not the same.
     NotFound
-        ``no_stretch``: no manoeuvre is there; and what `kempf.flows.jobs.bound_runs.bound` raises.
+        ``no_stretch``: no manoeuvre is there; ``no_run``: no manoeuvre of hers has this id; and what
+        `kempf.flows.jobs.bound_runs.bound` raises.
     DataRejected
         ``nothing_fitted``: none of the manoeuvres that the set was fitted to is left.
     """
     if end_utc_ns <= start_utc_ns:
         raise UsageError("window_empty", "The stretch ends before it begins.", "Give a later end.")
     hers = bound(warehouse, vessel, set_id, progress)
-    run = _run_of(hers, start_utc_ns, end_utc_ns)
+    run = _run_of(hers, start_utc_ns, end_utc_ns, segment_id or "")
     used = [bound_run for bound_run in hers.runs if not bound_run.held_out]
     if not used:
         raise DataRejected(
@@ -110,11 +114,19 @@ def explain_stretch(
     return ExplainedStretch(vessel, hers.parameter_set, run, start_utc_ns, end_utc_ns, explanation)
 
 
-def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int) -> BoundRun:
+def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int, name: str) -> BoundRun:
     """Return the manoeuvre that a stretch lies in; the stretch may reach beyond its ends."""
     spans = []
     runs = []
-    for run in hers.runs:
+    named = [run for run in hers.runs if run.segment.segment_id.startswith(name)]
+    if not named:
+        raise NotFound(
+            "no_run",
+            f"No manoeuvre of {hers.vessel!r} that can be predicted is called {name!r}.",
+            f"`kempf segments --vessel {hers.vessel}` lists them.",
+            {"segment_id": name},
+        )
+    for run in named:
         time = instants_utc_ns(run.filtered.run)
         spans.append(f"{run.segment.segment_id} {iso_utc(int(time[0]))[:19]} to {iso_utc(int(time[-1]))[:19]}")
         if int(time[0]) <= end_utc_ns and start_utc_ns <= int(time[-1]):
@@ -131,6 +143,6 @@ def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int) -> BoundRun:
         raise UsageError(
             "stretch_over_several",
             f"The stretch reaches over several manoeuvres, {names}, whose noise is not the same.",
-            "Take a stretch of one of them.",
+            "Take a stretch of one of them, or say which with --segment ID.",
         )
     return runs[0]

@@ -12,7 +12,7 @@ from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import diagnoses, parameter_sets
+from kempf.warehouse import code_version, diagnoses, parameter_sets
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -30,9 +30,10 @@ class Rivals:
 def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progress = silent) -> Rivals:
     """Return the sets of the models that fit the data of a set as well as its own.
 
-    A confusion set of the vessel's newest diagnosis names the effects that fit alike; a model with another member in an
-    effect's place is read where it is stored, and fitted to the same manoeuvres and stored where it is not; where other
-    manoeuvres are chosen by now there is a remark in its place. No alias moves.
+    The confusion sets of the vessel's diagnoses of the same manoeuvres name the effects that fit alike, of the present
+    code where there are such: a diagnosis that began from the model with its effects has none of them. A model with
+    another member in an effect's place is read where it is stored, and fitted to the same manoeuvres and stored where
+    it is not; where other manoeuvres are chosen by now there is a remark in its place. No alias moves.
 
     Parameters
     ----------
@@ -47,7 +48,11 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
         return Rivals(
             (), ("no diagnosis says which models fit as well: this one is taken alone; see `kempf diagnose`",)
         )
-    alike = [tuple(entry["effects"]) for entry in candidates[-1].content.get("sets", ()) if len(entry["effects"]) > 1]
+    present = code_version.fingerprint("diagnose")
+    candidates = [d for d in candidates if d.code_version == present] or candidates
+    alike = [
+        tuple(entry["effects"]) for d in candidates for entry in d.content.get("sets", ()) if len(entry["effects"]) > 1
+    ]
     rivals = [
         tuple(other if name == effect else name for name in effects)
         for effect in effects

@@ -72,7 +72,7 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
     for step in diagnosis.imitating:
         for member, confirmation in step.chosen_from:
             if member.effect.name == effect.name:
-                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized_by_refit(effect, confirmation)}")
+                return EffectFinding("suspected", f"{NOT_EXPLAINED}: {sized_by_refit(effect, confirmation)}")
     for immaterial in diagnosis.immaterial:
         for member, confirmation in immaterial.chosen_from:
             if member.effect.name == effect.name:

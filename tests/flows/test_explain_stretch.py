@@ -74,5 +74,11 @@ def test_what_cannot_be_explained_says_why(identified: Path):
 
     assert refused("2001-01-01", "2001-01-02") == (4, "no_stretch")
     assert refused(first["start"], second["end"]) == (2, "stretch_over_several")
+    both = ("explain", "--vessel", VESSEL, "--from", first["start"], "--to", second["end"], "--json")
+    # logs of a basin may share their instants: then the manoeuvre says which
+    for one in (first, second):
+        assert run(identified, *both, "--segment", one["segment_id"][:9]).json["segment_id"] == one["segment_id"]
+    nobody = kempf(*both, "--segment", "seg-nobody", "--warehouse", identified / "w")
+    assert (nobody.code, nobody.json["error"]["code"]) == (4, "no_run")
     assert refused(first["end"], first["start"]) == (2, "window_empty")
     assert refused("noon", first["end"]) == (2, "not_a_time")

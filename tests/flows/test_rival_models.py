@@ -68,6 +68,30 @@ def test_a_stored_set_with_the_other_effect_is_read(
     assert not fitted and not found.remarks
 
 
+def test_a_diagnosis_of_the_model_with_its_effects_parts_nothing(
+    drag: tuple[Warehouse, ParameterSet], fitted: list[tuple[str, ...]]
+) -> None:
+    warehouse, own = drag
+    made_of = own.provenance["inputs"]
+    # as `kempf report` stores one; its id may come before the other's or after it
+    for name in ("dx-0", "dx-2"):
+        about = (name, own.vessel, own.parameter_set_id, own.start_utc_ns, "unexplained", ())
+        assert diagnoses.insert(warehouse, StoredDiagnosis(*about, {"sets": []}, made_of, "c0de"))
+    rival_models.rivals_of(warehouse, own)
+    assert fitted == [("yaw_v3",)]
+
+
+def test_the_newest_diagnosis_of_a_fleet_is_of_the_plain_model(drag: tuple[Warehouse, ParameterSet]) -> None:
+    warehouse, own = drag
+    began = {"model": {"effects": ["cross_flow_drag"]}}
+    about = ("dx-2", own.vessel, own.parameter_set_id, own.start_utc_ns, "unexplained", ())
+    diagnoses.insert(warehouse, StoredDiagnosis(*about, {"sets": []}, began, "c0de"))
+    plain = {**own.provenance["inputs"], "model": {"effects": []}}
+    about = ("dx-1b", own.vessel, "ps-plain", own.start_utc_ns, "ambiguous", ("yaw_v3",))
+    diagnoses.insert(warehouse, StoredDiagnosis(*about, {"sets": []}, plain, "c0de"))
+    assert diagnoses.newest(warehouse)[own.vessel].diagnosis_id == "dx-1b"
+
+
 @pytest.mark.parametrize(
     "otherwise",
     [

@@ -9,7 +9,7 @@ import numpy as np
 
 from kempf.pipeline.diagnose.sentences import _share
 from kempf.pipeline.predict.free_run import FreeRun
-from kempf.workbench.rungs import compared, in_words
+from kempf.workbench.rungs import compared, in_words, remarks
 
 
 def test_a_free_run_that_diverges_has_no_error() -> None:
@@ -53,6 +53,9 @@ def test_what_is_not_known_of_a_rung_stops_no_table() -> None:
     assert one.by_legs and (tau.value, tau.std) == (2.0, None)
     # of a manoeuvre that came after the fit to legs there is none
     assert (in_words(one.free.fitted), in_words(one.leg.fitted), in_words(one.free.held_out)) == ("25", "diverges", "-")
+    assert one.off == (0, 1) and len(remarks([one])) == 1
+    (lost,) = compared([{**rung, "free_run_fitted_to_legs": {"seg-1": 2.5, "seg-2": None, "seg-3": 0.2}}])
+    assert remarks([lost])[1].startswith("2 of 3 free runs")
     # predictions do not take what has no covariance, so that it is not shown
     (plain,) = compared([{**rung, "one_leg_ahead": {**ahead, "covariance": [[None]]}}])
     assert not plain.by_legs and (plain.sizes[0].value, in_words(plain.free.fitted)) == (1.0, "50")

@@ -131,7 +131,7 @@ def as_verdict(verdict: str, stored: Mapping[str, Any], evidence: DiagnosisEvide
     content |= {"sets": [], "candidates": [{**one, "set_id": None} for one in stored["candidates"]]}
     if verdict == "unexplained":
         candidates = [
-            {**one, "verdict": "absent", "why": f"{NOT_EXPLAINED}: {one['title']}"} for one in content["candidates"]
+            {**one, "verdict": "suspected", "why": f"{NOT_EXPLAINED}: {one['title']}"} for one in content["candidates"]
         ]
         return {
             **content,

@@ -15,9 +15,12 @@ from kempf.workbench.terminal import number, print_json, print_paragraph, print_
 @click.option("--from", "start", required=True, metavar="TIME", help="Beginning of the stretch, ISO 8601.")
 @click.option("--to", "end", required=True, metavar="TIME", help="Its end.")
 @click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
+@click.option("--segment", "segment_id", metavar="ID", help="The manoeuvre, where several logs have these instants.")
 @warehouse_option
 @json_option
-def command(vessel: str, start: str, end: str, set_id: str | None, uri: str, as_json: bool) -> None:
+def command(
+    vessel: str, start: str, end: str, set_id: str | None, segment_id: str | None, uri: str, as_json: bool
+) -> None:
     """Rank the effects by what they would explain of one stretch of a manoeuvre, such as the worst one.
 
     `kempf compare --where` names the stretches where a model fails most. This ranks on those instants alone; whether an
@@ -28,7 +31,7 @@ def command(vessel: str, start: str, end: str, set_id: str | None, uri: str, as_
 
     begin, over = utc_ns_of(start, "--from"), utc_ns_of(end, "--to")
     with progress_bar() as progress:
-        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress).show()
+        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress, segment_id).show()
     if as_json:
         print_json(document)
         return

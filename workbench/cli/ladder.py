@@ -9,7 +9,7 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.rungs import BY_LEGS, Rung, Size, compared, in_words
+from kempf.workbench.rungs import Rung, Size, compared, in_words, remarks
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
 #: columns of the error one leg ahead, and of that of free runs
@@ -66,8 +66,8 @@ def percents(errors: Rung) -> list[str]:
 
 def print_by_legs(rungs: Sequence[Rung]) -> None:
     """Say where the figures of rungs are with the parameters fitted to legs."""
-    if rungs and rungs[-1].by_legs:
-        click.echo(f"  {BY_LEGS}")
+    for remark in remarks(rungs):
+        click.echo(f"  {remark}")
 
 
 def _size(size: Size) -> str:

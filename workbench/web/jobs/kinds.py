@@ -196,8 +196,9 @@ def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     from kempf.flows.jobs.explain_stretch import explain_stretch
 
     vessel, (begin, end) = arguments["vessel"], arguments["window_utc_ns"]
-    stretch = explain_stretch(warehouse, vessel, begin, end, arguments["set"], progress)
-    fields = {"set": arguments["set"], "from": iso_utc(begin), "to": iso_utc(end)}
+    named = arguments["segment"]
+    stretch = explain_stretch(warehouse, vessel, begin, end, arguments["set"], progress, named)
+    fields = {"set": arguments["set"], "from": iso_utc(begin), "to": iso_utc(end), "segment": named}
     return {"to": f"{of_vessel(vessel)}/explain?{urlencode(fields)}", "document": stretch.show()}
 
 
@@ -243,7 +244,7 @@ class Kind(NamedTuple):
 KINDS: Mapping[str, Kind] = {
     "ingest": Kind(ingest, "Take logs in", ("files", "profile", "new_vessel"), changes=True),
     "predict": Kind(predict, "Predict", ("set", "horizon")),
-    "explain": Kind(explain, "Explain a stretch", ("from", "to", "set")),
+    "explain": Kind(explain, "Explain a stretch", ("from", "to", "set", "segment")),
     "what_if": Kind(move, "Move a parameter", ("parameter", "set", "segment")),
     "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
     "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),

@@ -22,7 +22,8 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     Parameters
     ----------
     fields : mapping of str to str
-        ``from`` and ``to``, UTC; ``set``, by default the current one.
+        ``from`` and ``to``, UTC; ``set``, by default the current one; ``segment``, the manoeuvre, where logs share
+        their instants.
 
     Raises
     ------
@@ -33,7 +34,10 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     effects = reply.document["effects"] if reply.document is not None else []
     content = {
         "vessel": vessel,
-        "asked": {"from": fields.get("from", ""), "to": fields.get("to", ""), "set": reply.arguments["set"]},
+        "asked": {
+            **{name: fields.get(name, "") for name in ("from", "to", "segment")},
+            "set": reply.arguments["set"],
+        },
         "made": reply.document,
         "scored": [effect for effect in effects if effect["score"] is not None],
         "untestable": [effect for effect in effects if effect["score"] is None],

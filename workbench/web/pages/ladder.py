@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.workbench.documents.ladder import ladder_document
-from kempf.workbench.rungs import BY_LEGS, compared
+from kempf.workbench.rungs import compared, remarks
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.ladder import draw_ladder
@@ -20,10 +20,11 @@ def document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
 def gather(desk: Desk, vessel: str) -> Page:
     """Return the page of a vessel's ladder."""
     rungs = document(desk, vessel)
+    beside = compared(rungs)
     content = {
         "vessel": vessel,
-        "rungs": list(zip(rungs, compared(rungs), strict=True)),
+        "rungs": list(zip(rungs, beside, strict=True)),
         "drawn": draw_ladder(rungs),
-        "by_legs": BY_LEGS,
+        "remarks": remarks(beside),
     }
     return Page("ladder.html", "Ladder", content, ((vessel, of_vessel(vessel)),))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.flows.jobs.chosen_set import named_set
+from kempf.flows.jobs.leg_fit import by_name
 from kempf.flows.jobs.out_of_date import said_of_sets
 from kempf.warehouse import history
 from kempf.workbench.web.addresses import of_vessel
@@ -21,8 +22,12 @@ def document(desk: Desk, set_id: str) -> dict[str, Any]:
 def gather(desk: Desk, set_id: str) -> Page:
     """Return the page of a parameter set."""
     parameter_set = named_set(desk.warehouse, set_id, None)
+    unseen = {*(parameter_set.convergence.get("held_out") or ()), *(parameter_set.convergence.get("left_out") or ())}
     content = {
         "one": parameter_set.show(),
+        "fitted": [name for name in parameter_set.segment_ids if name not in unseen],
+        "held_out": list(parameter_set.convergence.get("held_out") or ()),
+        "by_legs": by_name(parameter_set),
         "groups": (
             ("Parameters", parameter_set.parameters),
             ("Noise and disturbances", parameter_set.noise),
