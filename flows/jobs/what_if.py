@@ -7,12 +7,13 @@ most that a value costs: where others are fitted anew beside it, it costs less.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from kempf.flows.jobs.bound_runs import BoundRun, BoundRuns, bound
+from kempf.flows.jobs.leg_fit import by_name
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.run_series import first_heading
@@ -62,6 +63,8 @@ class WhatIf:
     run: BoundRun
     #: In ascending order of the value; the estimate is among them.
     tried: tuple[Tried, ...]
+    #: Whether the parameters are those fitted to legs, which predictions take.
+    by_legs: bool = False
 
     def show(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
@@ -74,6 +77,7 @@ class WhatIf:
             "unit": self.unit,
             "value": self.value,
             "std": self.std,
+            "fitted_to_legs": self.by_legs,
             "others": "held as they are: fitted anew beside it, a value costs less",
             "tried": [attempt.show() for attempt in self.tried],
         }
@@ -107,6 +111,8 @@ def what_if(
 ) -> WhatIf:
     """Move one parameter of a set by up to four standard errors to each side.
 
+    Of a model with effects it is the ship that predictions are made with.
+
     Parameters
     ----------
     parameter : str
@@ -133,8 +139,14 @@ def what_if(
             f"Choose one of {', '.join(parameters)}.",
             {"parameters": list(parameters)},
         )
-    run = _run(hers, segment_id)
     estimate, place = parameters[parameter], hers.names.index(parameter)
+    by_legs = by_name(hers.parameter_set) if hers.parameter_set.model_spec.get("effects") else {}
+    if hers.legs is not None and by_legs:
+        # the ship that predictions are made with
+        hers = replace(hers, hull=hers.legs[0], values=hers.legs[1])
+        if parameter in by_legs:
+            estimate = replace(estimate, value=by_legs[parameter][0], std=by_legs[parameter][1])
+    run = _run(hers, segment_id)
     std = estimate.std if estimate.std is not None and np.isfinite(estimate.std) and estimate.std > 0.0 else None
     step = _STEP * std if std is not None else _SHARE * abs(estimate.value) or 1e-6
     moves = np.arange(-_SIDE, _SIDE + 1)
@@ -161,7 +173,8 @@ def what_if(
             )
         )
     progress(moves.size, moves.size, "tried")
-    return WhatIf(vessel, hers.parameter_set, parameter, estimate.unit, estimate.value, std, run, tuple(tried))
+    about = (vessel, hers.parameter_set, parameter, estimate.unit, estimate.value, std, run)
+    return WhatIf(*about, tuple(tried), bool(by_legs))
 
 
 def _run(hers: BoundRuns, segment_id: str | None) -> BoundRun:

@@ -50,8 +50,8 @@ class OwnZigzags:
         if self.overshoots < FEWEST:
             return "too few zigzags of her own to hold the intervals against"
         words = (
-            f"her own {self.zigzags} zigzags: {self.inside} of {self.overshoots} first and second overshoots in the "
-            f"interval of the errors, {self.rms_deg:.2g} deg rms off"
+            f"her own {self.zigzags} zigzags: intervals of the errors alone hold {self.inside} of {self.overshoots} "
+            f"first and second overshoots, {self.rms_deg:.2g} deg rms off"
         )
         if self.before is not None:
             words = (
@@ -60,7 +60,10 @@ class OwnZigzags:
         if self.scatter <= 0.0:
             return words
         most = ", the most that is tried" if self.scatter >= MOST else ""
-        return f"{words}; every parameter scatters by {100.0 * self.scatter:.2g} % beside its error for it{most}"
+        return (
+            f"{words}; so the intervals shown let every parameter scatter by {100.0 * self.scatter:.2g} % of its size "
+            f"beside its error{most}"
+        )
 
 
 def held_against(overshoots: Float, zigzags: int) -> OwnZigzags:

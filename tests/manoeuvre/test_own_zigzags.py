@@ -35,7 +35,7 @@ def test_the_scatter_is_what_makes_the_intervals_hold() -> None:
     assert found == pytest.approx(REFERENCE * np.sqrt(8.0) / 1.5, rel=0.15)
     assert scatter(_overshoots(300.0), _overshoots(0.0)) == MOST
     said = replace(held_against(_overshoots(3.0), 200), scatter=found).sentence
-    assert "every parameter scatters by 5" in said
+    assert "let every parameter scatter by 5" in said
 
 
 def test_one_gust_scatters_nothing_and_few_overshoots_say_nothing() -> None:

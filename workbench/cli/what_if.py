@@ -46,3 +46,5 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
         f"{answer.parameter_set.parameter_set_id} of {vessel}, {answer.run.segment.segment_id} run freely",
     )
     print_paragraph("the other parameters are held: fitted anew beside it, a value costs less")
+    if answer.by_legs:
+        print_paragraph("parameters are those fitted to legs, which predictions take: the likelihood prefers others")
