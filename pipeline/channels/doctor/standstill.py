@@ -61,7 +61,9 @@ def _judged(channel: str, reference: str, standstill: tuple[Series, float] | Non
     turned = 0.0 if standstill is None else standstill[1]
     figure = Figure("turn while the channel is constant", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
     if standstill is None:
-        return Outcome(name, channels, "agree", f"{channel} is never constant while the ship turns", (figure,))
+        # that a reading moves says nothing of its zero or its sense
+        words = f"{channel} is never constant while the ship turns"
+        return Outcome(name, channels, "agree", words, (figure,), alone=True)
     start, end = int(standstill[0].time_utc_ns[0]), int(standstill[0].time_utc_ns[-1])
     words = (
         f"{channel} is constant for {(end - start) / SECOND_NS:.0f} s, during which the ship turns by "
