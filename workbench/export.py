@@ -35,8 +35,11 @@ def as_text(parameter_set: ParameterSet, form: str) -> str:
     Parameters
     ----------
     form : {"yaml", "csv", "json"}
-        CSV holds the parameters alone: group, name, value, std, unit.
+        CSV holds the parameters alone: group, name, value, std, unit; the group ``fitted_to_legs`` where predictions
+        take these.
     """
+    from kempf.flows.jobs.leg_fit import by_name
+
     if form == "csv":
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
@@ -44,6 +47,10 @@ def as_text(parameter_set: ParameterSet, form: str) -> str:
         for group in ("parameters", "discrete", "noise"):
             for p in getattr(parameter_set, group):
                 writer.writerow([parameter_set.parameter_set_id, group, p.name, repr(p.value), repr(p.std), p.unit])
+        units = {p.name: p.unit for p in parameter_set.parameters}
+        for name, (value, std) in by_name(parameter_set).items():
+            row = [parameter_set.parameter_set_id, "fitted_to_legs", name, repr(value), repr(std), units[name]]
+            writer.writerow(row)
         return stream.getvalue()
     content = {key: value for key, value in parameter_set.show().items() if key != "iterations"}
     if form == "json":

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -16,7 +18,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.export import as_control, linear
+from kempf.workbench.export import as_control, as_text, linear
 from tests.late import VESSEL
 
 NAMES = ("a11", "a12", "a21", "a22", "b1", "b2", "wind_force.c", "wind_force.k", "cross_flow_drag.c")
@@ -75,6 +77,9 @@ def test_steering_and_exports_take_what_predictions_take(late_added: Path) -> No
     assert set(plain.warnings) - set(ship.of_parameters) <= {
         w for w in plain.warnings if "not determined" in w or ">" in w
     }
+    rows = list(csv.DictReader(io.StringIO(as_text(plain, "csv"))))
+    exported = {row["name"]: float(row["value"]) for row in rows if row["group"] == "fitted_to_legs"}
+    assert exported == module["PARAMETERS"]
     right = ship_of_set(warehouse, with_lag)
     values = {p.name: p.value for p in with_lag.parameters}
     assert right.hull.array().tolist() == [values[name] for name in HULL_PARAMETERS]
