@@ -97,17 +97,23 @@ def _sets(vessel: str, sets: list[ParameterSet]) -> Iterator[tuple[str, Content]
 def machine() -> Content:
     """Return what bits depend on beside the code."""
     libraries = {name: version(name) for name in (*result_page.LIBRARIES, "llvmlite")}
-    return {"processor": _processor(), "python": platform.python_version(), **libraries}
+    libc = " ".join(platform.libc_ver())
+    return {"processor": _processor(), "libc": libc, "python": platform.python_version(), **libraries}
 
 
 def _processor() -> str:
-    """Return the name of the processor with family, model and stepping: one name may stand for several of them."""
+    """Return the name of the processor with family, model and stepping, and a digest of what it can do.
+
+    One name may stand for several of them, and a virtual machine may hide vector instructions that another has:
+    kernels are then compiled otherwise, and sums end in other last digits.
+    """
     known: dict[str, str] = {}
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         name, _, value = line.partition(":")
         known.setdefault(name.strip(), value.strip())
     found = [known[name] for name in ("model name", "cpu family", "model", "stepping") if name in known]
-    return " ".join(found) or platform.machine()
+    able = hashlib.sha256(" ".join(sorted(known.get("flags", "").split())).encode()).hexdigest()[:8]
+    return " ".join((*found, able)) if found else platform.machine()
 
 
 def differences(reference: Content, found: Content, *, bits: bool) -> list[str]:
