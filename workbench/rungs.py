@@ -12,8 +12,6 @@ from math import inf, isnan, nan
 from statistics import median
 from typing import Any
 
-from kempf.flows.jobs.leg_fit import taken_by_predictions
-from kempf.pipeline.shooting.inflation import inflation
 from kempf.workbench.terminal import number
 
 #: percent of the motion from which a free run has left the measured course
@@ -67,6 +65,9 @@ def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
     rungs : sequence of mapping
         JSON content of a ladder, in order.
     """
+    # what computes is not loaded by a command that prints its help
+    from kempf.flows.jobs.leg_fit import taken_by_predictions
+
     last: Mapping[str, Any] = rungs[-1] if rungs else {}
     by_legs = bool(last.get("effects")) and taken_by_predictions(last.get("one_leg_ahead"))
     return [
@@ -141,6 +142,8 @@ def _percent(error: float | None) -> float:
 
 
 def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[Size, ...]:
+    from kempf.pipeline.shooting.inflation import inflation
+
     ahead = rung.get("one_leg_ahead") or {}
     own = {n: one for n, one in rung["effects"].items() if n.partition(".")[0] == rung["added"]}
     factor = 1.0
