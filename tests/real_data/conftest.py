@@ -2,11 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import pytest
 
 from benchmarks import measured_ships
 from kempf.warehouse.store import Warehouse
 from tests.real_data.voyage import SHARED, Voyage, require, sail
+from tests.workbench.web.browsing import launched
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    yield from launched()
 
 
 @pytest.fixture(scope="session")

@@ -61,6 +61,16 @@ def served(place: Path, state: Path, *options: str) -> Iterator[Server]:
         process.stderr.close()
 
 
+def launched() -> Iterator[Any]:
+    """A browser, for a fixture."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        one = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield one
+        one.close()
+
+
 def opened(browser: Any, server: Server, **options: Any) -> Any:
     """A tab in which a complaint of the browser is one of the test's."""
     tab = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options}).new_page()

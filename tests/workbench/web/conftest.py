@@ -16,7 +16,7 @@ from kempf.workbench.web.jobs.keeper import Keeper
 from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.settings import Settings
 from tests.workbench.conftest import _filled, filled, logs, own  # noqa: F401
-from tests.workbench.web.browsing import BROWSER, Server, served
+from tests.workbench.web.browsing import Server, launched, served
 
 TOKEN = "of-this-test"  # noqa: S105
 OURS = {"origin": "http://127.0.0.1"}
@@ -75,12 +75,7 @@ def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Que
 
 @pytest.fixture
 def browser() -> Iterator[Any]:
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as playwright:
-        one = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
-        yield one
-        one.close()
+    yield from launched()
 
 
 @pytest.fixture
