@@ -170,6 +170,11 @@ class ParameterSet:
                 raise ValueError(f"{group} share a name: {names}")
 
     @property
+    def unseen(self) -> frozenset[str]:
+        """Segments that it names and was not fitted to: held out, or left out as nothing could be made of them."""
+        return frozenset((*(self.convergence.get("held_out") or ()), *(self.convergence.get("left_out") or ())))
+
+    @property
     def updates(self) -> Update | None:
         """The set that this one brings forward; None where it stands by itself."""
         return update_in(self.settings)

@@ -91,6 +91,11 @@ def remarks(rungs: Sequence[Rung]) -> list[str]:
     return [BY_LEGS, *([lost] if off else [])]
 
 
+def effect_names(rung: Mapping[str, Any]) -> list[str]:
+    """Return the names of the effects of a rung's model, in order."""
+    return list(dict.fromkeys(name.partition(".")[0] for name in rung.get("effects") or ()))
+
+
 def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
     """Return the free-run error of each manoeuvre with the parameters fitted to legs, percent of the motion.
 

@@ -149,8 +149,7 @@ class _Seen:
 
 def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
     inputs: Mapping[str, Any] = chosen.provenance.get("inputs") or {}
-    fit = chosen.convergence
-    unseen = {*(fit.get("held_out") or ()), *(fit.get("left_out") or ())}
+    unseen = chosen.unseen
     bounds = list(inputs.get("segments", ()))
     # a model with effects names its held-out runs among its segments, in the order of the bounds
     names = chosen.settings.get("segments") or [""] * len(bounds)

@@ -52,6 +52,14 @@ def by_name(parameter_set: ParameterSet) -> dict[str, tuple[float, float]]:
     return dict(zip(_names(parameter_set, ahead), pairs, strict=True))
 
 
+def shown_by_legs(parameter_set: ParameterSet) -> bool:
+    """Return whether free runs of a set are shown with the parameters fitted to legs, as in a ladder that ends there.
+
+    A plain model is shown by the likelihood's, as effects that are added later are compared with these.
+    """
+    return bool(parameter_set.model_spec.get("effects")) and bool(by_name(parameter_set))
+
+
 def _ahead(parameter_set: ParameterSet) -> Mapping[str, Any] | None:
     ahead: Mapping[str, Any] | None = ((parameter_set.fit or {}).get("rung") or {}).get("one_leg_ahead")
     return ahead

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.ship_model import ShipOfSet
@@ -131,22 +130,22 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         shaft_share=1.0 / basis.surge.settled[0] if basis.kept_m is not None else 1.0,
     )
     values = effects.values if effects is not None else np.zeros(0)
-    hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0
-    legs = fitted_to_legs(parameter_set)
-    if legs is None:
+    hull, covariance = ship.hull.array(), ship.covariance
+    if ship.leg_factor is None:
         factor = _widened(parameter_set, waters.model, basis, hull, values, covariance)
+        covariance = factor**2 * covariance
     else:
-        hull, values, covariance, factor = legs
+        factor = ship.leg_factor
     return Identified(
         name=parameter_set.parameter_set_id,
         waters=waters,
         hull=hull,
         effects=values,
-        covariance=factor**2 * covariance,
+        covariance=covariance,
         surge=basis.surge,
         rudder_rate=basis.rudder_rate,
         widened=factor,
-        fitted_to_legs=legs is not None,
+        fitted_to_legs=ship.leg_factor is not None,
     )
 
 

@@ -63,8 +63,9 @@ class ShipOfSet:
     noise: NoiseLevels
     #: What a linear model about a straight course has not, or not wholly, of the effects.
     remarks: tuple[str, ...]
-    #: Whether the parameters are those fitted to legs.
-    by_legs: bool
+    #: Factor on the standard errors of parameters fitted to legs, in ``covariance`` already; None where they are the
+    #: likelihood's.
+    leg_factor: float | None
     #: What the set says against the parameters; of those fitted to legs that they are, and what is implausible about
     #: them in the place of what is about the likelihood's.
     of_parameters: tuple[str, ...]
@@ -76,7 +77,7 @@ class ShipOfSet:
         """The parameters of hull and effects, in the order of ``covariance``."""
         held = {p.name: p for p in self.parameter_set.parameters}
         names = [*HULL_PARAMETERS, *(self.effects.model.names if self.effects is not None else ())]
-        if not self.by_legs:
+        if self.leg_factor is None:
             return tuple(held[name] for name in names)
         values = [*self.hull.array().tolist(), *(self.effects.values.tolist() if self.effects is not None else ())]
         stds = np.sqrt(np.diag(self.covariance)).tolist()
@@ -114,10 +115,9 @@ def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: fl
             "Give the speed through the water with --speed.",
         )
     by_name = {p.name: p.value for p in parameter_set.parameters if p.value is not None}
-    hull = Hull(*(float(by_name.get(name, np.nan)) for name in HULL_PARAMETERS))
     legs = fitted_to_legs(parameter_set)
-    if legs is not None:
-        hull = Hull(*(float(value) for value in legs[0]))
+    own = [by_name.get(name, np.nan) for name in HULL_PARAMETERS] if legs is None else legs[0].tolist()
+    hull = Hull(*map(float, own))
     require_numbers(hull, float(speed))
     profile = vessels.get(warehouse, str(parameter_set.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
@@ -130,13 +130,14 @@ def ship_of_set(warehouse: Warehouse, parameter_set: ParameterSet, speed_m_s: fl
     warnings = [*of_parameters, *assumed, *remarks]
     if not parameter_set.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {parameter_set.convergence.get('reason')}")
-    covariance = covariance_of(parameter_set, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
-    if legs is not None:
+    if legs is None:
+        covariance = covariance_of(parameter_set, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
+    else:
         covariance = legs[3] ** 2 * legs[2]
     numbers = (float(speed), arm or 0.0, profile.length_m)
     return ShipOfSet(
         *(parameter_set, hull, effects, covariance, spec, *numbers, noise, remarks),
-        by_legs=legs is not None,
+        leg_factor=None if legs is None else legs[3],
         of_parameters=of_parameters,
         warnings=tuple(warnings),
     )

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.bound_runs import BoundRun, BoundRuns, bound
-from kempf.flows.jobs.leg_fit import by_name
+from kempf.flows.jobs.leg_fit import by_name, shown_by_legs
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.run_series import first_heading
@@ -140,7 +140,7 @@ def what_if(
             {"parameters": list(parameters)},
         )
     estimate, place = parameters[parameter], hers.names.index(parameter)
-    by_legs = by_name(hers.parameter_set) if hers.parameter_set.model_spec.get("effects") else {}
+    by_legs = by_name(hers.parameter_set) if shown_by_legs(hers.parameter_set) else {}
     if hers.legs is not None and by_legs:
         # the ship that predictions are made with
         hers = replace(hers, hull=hers.legs[0], values=hers.legs[1])

@@ -11,7 +11,7 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
-from kempf.workbench.rungs import compared
+from kempf.workbench.rungs import compared, effect_names
 from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 _SHOWN = 12
@@ -153,7 +153,7 @@ def next_commands(document: Mapping[str, Any]) -> list[str]:
 
 def _first_model(step: Mapping[str, Any]) -> str:
     """Return what the diagnosis began from: the plain model, or one that has effects already."""
-    effects = dict.fromkeys(name.partition(".")[0] for name in step["effects"])
+    effects = effect_names(step)
     return "model with " + ", ".join(effects) if effects else "plain model"
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kempf.flows.fleet.state import VesselState, fleet_state, responsible_code
 from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.leg_fit import by_name
+from kempf.flows.jobs.leg_fit import by_name, shown_by_legs
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
@@ -85,8 +85,8 @@ def free_horizon(parameter_set: ParameterSet, asked: str | None = None) -> str:
     asked : str, optional
         ``legs`` takes those fitted to legs of a plain model too, where predictions take them.
     """
-    wanted = asked == "legs" or bool(parameter_set.model_spec.get("effects"))
-    return "legs" if wanted and by_name(parameter_set) else "free"
+    by_legs = by_name(parameter_set) if asked == "legs" else shown_by_legs(parameter_set)
+    return "legs" if by_legs else "free"
 
 
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:

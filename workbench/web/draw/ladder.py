@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from kempf.workbench.rungs import effect_names
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
 
@@ -77,7 +78,7 @@ def draw_ladder(rungs: Sequence[Mapping[str, Any]]) -> Markup | None:
 
 def _first(rung: Mapping[str, Any]) -> str:
     """Return what the first model is called: a diagnosis may begin from one that has effects."""
-    has = list(dict.fromkeys(name.partition(".")[0] for name in rung.get("effects") or ()))
+    has = effect_names(rung)
     return f"model with {len(has)} effects" if len(has) > 1 else f"with {has[0]}" if has else "plain model"
 
 
