@@ -42,6 +42,15 @@ def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False, 
     show_warnings(parameter_set.warnings, verbose=verbose)
 
 
+def tell_by_likelihood(parameter_set: ParameterSet) -> None:
+    """Print, below parameters by the likelihood, that predictions take others, where they do."""
+    if _of_legs(parameter_set):
+        click.echo(
+            f"  {parameter_set.parameter_set_id}: by the likelihood's parameters; predictions take those fitted to "
+            "legs (kempf params show)"
+        )
+
+
 def _of_legs(parameter_set: ParameterSet) -> dict[str, list[str]]:
     """Return value and standard error of each parameter fitted to legs, empty where predictions take no such ones."""
     from kempf.flows.jobs.leg_fit import by_name

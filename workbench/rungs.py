@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isnan, nan
-from statistics import median
+from math import isnan, nan
 from typing import Any
 
+from kempf.pipeline.predict.median_error import median_error
 from kempf.workbench.terminal import number
 
 #: percent of the motion from which a free run has left the measured course
@@ -122,7 +122,8 @@ def _leg(rung: Mapping[str, Any]) -> Errors:
 def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
     if by_legs and rung.get("free_run_fitted_to_legs"):
         legs = by_manoeuvre(rung)
-        fitted, held = (_median(legs[name] for name in rung[key] if name in legs) for key in ("in_sample", "held_out"))
+        own = ([legs[name] for name in rung[key] if name in legs] for key in ("in_sample", "held_out"))
+        fitted, held = (median_error(errors) if errors else None for errors in own)
     else:
         fitted, held = (
             _percent(rung[error]) if rung[key] else None
@@ -134,12 +135,6 @@ def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
 def _mean(errors: Iterable[float | None]) -> float | None:
     every = [nan if error is None else error for error in errors]
     return sum(every) / len(every) if every else None
-
-
-def _median(errors: Iterable[float]) -> float | None:
-    every = [inf if isnan(error) else error for error in errors]
-    middle = median(every) if every else None
-    return nan if middle == inf else middle
 
 
 def _percent(error: float | None) -> float:

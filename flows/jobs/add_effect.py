@@ -16,6 +16,7 @@ from kempf.flows.jobs.standing_model import (
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -36,7 +37,8 @@ def add_effect(
 ) -> ParameterSet:
     """Add an effect to a vessel's model, refit, and make the result her model; its parent is the one before.
 
-    A model that predicts worse than its parent, beyond the error, is stored and does not become hers.
+    A model that predicts worse than its parent, beyond the error, or that did not converge where its parent did, is
+    stored and does not become hers.
 
     Parameters
     ----------
@@ -76,17 +78,27 @@ def add_effect(
         from kempf.flows.jobs.vessel_model import store_model
 
         parameter_set, _ = store_model(warehouse, chosen, larger_spec, both, progress)
-    worse = worsening(parameter_set)
+    worse = [*worsening(parameter_set), *_lost_its_top(warehouse, parameter_set)]
     if worse and not force:
         raise DataRejected(
             "effect_worsens",
-            f"{name} makes the predictions of {vessel!r} worse: {'; '.join(worse)}. The model is stored as "
+            f"{name} makes the model of {vessel!r} worse: {'; '.join(worse)}. It is stored as "
             f"{parameter_set.parameter_set_id}; her current one stays.",
             "Add it all the same with --force, or see what `kempf diagnose` names.",
             {"effect": name, "parameter_set_id": parameter_set.parameter_set_id, "worse": worse},
         )
     point(warehouse, parameter_set, now)
     return parameter_set
+
+
+def _lost_its_top(warehouse: Warehouse, parameter_set: ParameterSet) -> list[str]:
+    """Return that a fit did not converge though its parent's did, a phrase."""
+    if parameter_set.convergence.get("converged") or parameter_set.parent is None:
+        return []
+    parent = parameter_sets.get(warehouse, parameter_set.parent)
+    if not parent.convergence.get("converged"):
+        return []
+    return [f"the fit did not converge ({parameter_set.convergence.get('reason')}), as the one without it did"]
 
 
 def worsening(parameter_set: ParameterSet) -> list[str]:

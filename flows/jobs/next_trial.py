@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import degrees, radians
+from math import ceil, degrees, floor, inf, log10, radians
 from typing import Any
 
 import numpy as np
@@ -44,6 +44,8 @@ ANGLES_DEG = (
     (30.0, 30.0),
     (35.0, 35.0),
 )
+#: probability below which one trial more of the kind is no way to part models
+_WORTH_REPEATING = 0.05
 #: probability with which a trial that is said to part models does
 _SURE = 0.9
 #: rudder beyond that which was sailed of which nothing is said, deg
@@ -128,7 +130,7 @@ class NextTrial:
             if name.startswith("overshoots_deg.") and f.value is not None
         ]
         return [
-            f"Zigzag {heading:g}/{rudder:g}. Sea room of {_round(along)} m along the approach and {_round(across)} m "
+            f"Zigzag {heading:g}/{rudder:g}. Sea room of {along:g} m along the approach and {across:g} m "
             "across it, current and wind not counted; deep water.",
             f"Steady on a straight course at {self.speed_m_s:.3g} m/s through the water for a minute or more; the "
             "engine is left as it is from then on.",
@@ -160,10 +162,11 @@ class NextTrial:
                     f"One zigzag {name} more parts {alike} with a probability of {_percent(sure)}, whichever is true."
                 )
             else:
+                often = "Sail it more than once, or" if sure >= _WORTH_REPEATING else "Sail"
                 sentences.append(
                     f"None of the {len(self.trials)} zigzags parts {alike} with a probability of {_percent(_SURE)}; "
-                    f"the best, {name}, with {_percent(sure)}. Sail it more than once, or a turning circle, by which "
-                    "models are compared (`kempf predict --compare`)."
+                    f"the best, {name}, with {_percent(sure)}. {often} a turning circle, by which models are compared "
+                    "(`kempf predict --compare`)."
                 )
             sentences.append(
                 "The probability holds where one of the models is the whole truth; where neither is, less."
@@ -244,10 +247,12 @@ def next_trial(
     return NextTrial(vessel, hers.parameter_set, effects, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
 
 
-def _rank(trial: Trial, parameter: str | None) -> float:
+def _rank(trial: Trial, parameter: str | None) -> tuple[float, float]:
+    """Return what the best trial has least of."""
     if parameter is not None:
-        return trial.narrowed[parameter]
-    return trial.mean_narrowed if trial.probability is None else -trial.probability
+        # one run may narrow more than another by which the error never halves
+        return trial.times_to_halve or inf, trial.narrowed[parameter]
+    return (trial.mean_narrowed if trial.probability is None else -trial.probability), 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +323,10 @@ def _trial(
     return Trial(
         angles_deg=angles,
         duration_s=float(track.column(motion.TIME)[-1]),
-        sea_room_m=(float(np.ptp(track.column(motion.NORTH))), float(np.ptp(track.column(motion.EAST)))),
+        sea_room_m=(
+            _upwards(np.ptp(track.column(motion.NORTH)).item()),
+            _upwards(np.ptp(track.column(motion.EAST)).item()),
+        ),
         narrowed={name: shares[name] for name in of_ship},
         times_to_halve=None
         if parameter is None
@@ -342,10 +350,10 @@ def _show(trial: Trial) -> dict[str, Any]:
     }
 
 
-def _round(metres: float) -> str:
+def _upwards(metres: float) -> float:
     """Return a length to two digits, upwards."""
-    unit = 10.0 ** np.floor(np.log10(max(metres, 1.0)) - 1.0)
-    return f"{np.ceil(metres / unit) * unit:g}"
+    unit = 10.0 ** (floor(log10(max(metres, 1.0))) - 1)
+    return float(f"{ceil(metres / unit) * unit:.2g}")
 
 
 def _halving(times: int | None) -> str:
@@ -355,7 +363,9 @@ def _halving(times: int | None) -> str:
 
 
 def _percent(share: float) -> str:
-    return "more than 99 %" if share > 0.995 else f"{100.0 * share:.0f} %"
+    if share > 0.995:
+        return "more than 99 %"
+    return f"{100.0 * share:.0f} %" if share >= 0.005 else "less than 1 %"
 
 
 def _minutes(seconds: float) -> str:

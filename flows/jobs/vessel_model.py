@@ -38,6 +38,7 @@ from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import common_slip
 from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
+from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
@@ -47,6 +48,8 @@ from kempf.warehouse.parameter_set import StoredValue as Stored
 from kempf.warehouse.store import Warehouse
 
 _STEP_S = 1.0
+#: standard errors from nothing within which an effect may as well not be there
+_THERE = 2.0
 #: key of a pooled set's convergence that holds what its fit leaves for further runs
 POSTERIOR = "posterior"
 
@@ -265,6 +268,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             *alone,
             *(() if effects else _disagreement(plain)),
             *_ahead_disagrees(step.ahead),
+            *_of_nothing(step.ahead, errors.fit.ship_part(errors.widened(agreement).covariance)),
             *result.warnings,
         ),
         parent=request.parent,
@@ -307,6 +311,26 @@ def _ahead_disagrees(ahead: Ahead | None) -> tuple[str, ...]:
         f"({ahead.horizon_s:.3g} s) ahead is {100.0 * ahead.disagrees.falls_by:.0f} % smaller with parameters fitted "
         "to legs, which predictions of manoeuvres take (one_leg_ahead)",
     )
+
+
+def _of_nothing(ahead: Ahead | None, ship: ShipPart) -> tuple[str, ...]:
+    """Return a warning for every effect that may as well not be there, by the parameters that predictions take."""
+    by_likelihood = (ship.model, ship.values, ship.std[N_HULL:])
+    taken = by_likelihood
+    if ahead is not None and ahead.disagrees is not None:
+        taken = (ahead.model, ahead.fit.values, ahead.std[N_HULL:])
+    warnings = []
+    for effect in ship.model.effects:
+        model, values, std = taken if taken[0].own(effect.name).any() else by_likelihood
+        own = np.flatnonzero(model.own(effect.name))
+        pairs = [(p, values[k], std[k]) for p, k in zip(effect.parameters, own, strict=True) if not p.shapes]
+        if pairs and all(abs(value) < _THERE * error for _, value, error in pairs):
+            sizes = ", ".join(
+                f"{effect.name}.{p.name} = {value:.2g} ± {error:.1g} {p.unit.removesuffix('1')}".rstrip()
+                for p, value, error in pairs
+            )
+            warnings.append(f"within {_THERE:g} standard errors of nothing, these data do not show it: {sizes}")
+    return tuple(warnings)
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:

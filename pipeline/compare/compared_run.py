@@ -60,11 +60,11 @@ def compare_run(
     if horizon.kind == "free run, fitted to legs":
         assert by_legs is not None
         free_run = by_legs
-    free = of_free_run(filtered, free_run, horizon if horizon.kind.startswith("free") else horizon_of("free"))
+    free = of_free_run(filtered, free_run, horizon if horizon.runs_freely else horizon_of("free"))
     return ComparedRun(
         name=run.name,
         held_out=held_out,
-        predicted=free if horizon.kind.startswith("free") else predict(filtered, point, horizon),
+        predicted=free if horizon.runs_freely else predict(filtered, point, horizon),
         free=free,
         free_run_error=error,
         overshoots=compare_overshoots(

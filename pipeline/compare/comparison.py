@@ -10,6 +10,7 @@ import numpy as np
 
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.compare.overshoot import OvershootError
+from kempf.pipeline.predict.median_error import median_error
 from kempf.pipeline.predict.prediction import Predicted
 from kempf.pipeline.predict.run_residuals import RunResiduals
 
@@ -187,7 +188,7 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             "not_predicted": len(errors) - len(known),
         },
         "free_run_error_percent": _in_percent(_mean([run.free_run_error for run in runs])),
-        "free_run_error_percent_fitted_to_legs": _in_percent({**_mean(legs), "median": _median(legs)})
+        "free_run_error_percent_fitted_to_legs": _in_percent({**_mean(legs), "median": _finite(median_error(legs))})
         if legs
         else None,
     }
@@ -211,15 +212,12 @@ def _error(runs: Sequence[ComparedRun]) -> float:
     # a ladder keeps means of shares; to the last digit the same they are only if the mean comes first here too
     if runs[0].by_legs:
         # the free run of a ship that keeps no course may run off
-        middle = _median([run.shown_error for run in runs])
-        return float("nan") if middle is None else 100.0 * middle
+        return 100.0 * median_error(run.shown_error for run in runs)
     return 100.0 * float(np.mean([run.free_run_error for run in runs]))
 
 
-def _median(errors: Sequence[float]) -> float | None:
-    """Return the middle error, None where half of the free runs diverge."""
-    middle = float(np.median(np.nan_to_num(errors, nan=np.inf)))
-    return middle if np.isfinite(middle) else None
+def _finite(error: float) -> float | None:
+    return error if np.isfinite(error) else None
 
 
 def _in_percent(mean: dict[str, float | None]) -> dict[str, float | None]:

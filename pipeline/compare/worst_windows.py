@@ -13,8 +13,8 @@ from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import RunResiduals
 
-#: a window in instants, and how many windows are shown of each kind
-_WINDOW, _SHOWN = 20, 5
+#: a window in instants, with a few to spare of what `kempf explain` needs, and how many windows are shown of each kind
+_WINDOW, _SHOWN = 24, 5
 _FEWEST = 4
 _MS_NS = 1_000_000
 

@@ -123,7 +123,7 @@ def _refitted(ladder: Ladder, findings: LikelihoodFindings) -> list[tuple[Candid
                 continue
         # the score predicts the likelihood ratio, but not beside what is no ship; what is far behind the best refit
         # cannot come near it
-        if is_ship(fit.hull) and any(
+        if is_ship(fit) and any(
             candidate.score * _MOST_GAIN < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
         ):
             continue

@@ -7,14 +7,13 @@ from typing import Any
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
-from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED, climbed, finding, refusal
+from kempf.pipeline.diagnose.effect_finding import climbed, finding, improves_the_fit, refusal
 from kempf.pipeline.diagnose.final_sizes import Size, refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.diagnose.sentences import sentences
-from kempf.pipeline.diagnose.sizes import sized_by_refit
-from kempf.pipeline.diagnose.verdict import share_explained, verdict
+from kempf.pipeline.diagnose.verdict import share_explained, share_of_given, verdict
 from kempf.schemas.effect import Effect
 
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -46,6 +45,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "suspected": _suspected(diagnosis),
         "share_explained": share_explained(diagnosis),
+        "share_explained_before": share_of_given(diagnosis),
         "remaining_misfit": None if diagnosis.remaining is None else remaining_json(diagnosis.remaining),
         "refused": [
             _refit(c, k) | {"why": diagnosis.suspected.get(c.effect.name) or refusal(k)}
@@ -123,9 +123,8 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
 
 
 def _suspected(diagnosis: Diagnosis) -> list[dict[str, str]]:
-    imitating = [pair for step in diagnosis.imitating for pair in step.chosen_from]
-    why = {c.effect.name: f"{NOT_EXPLAINED}: {sized_by_refit(c.effect, k)}" for c, k in imitating}
-    return [{"effect": name, "why": words} for name, words in sorted({**diagnosis.suspected, **why}.items())]
+    every = {**diagnosis.suspected, **improves_the_fit(diagnosis)}
+    return [{"effect": name, "why": words} for name, words in sorted(every.items())]
 
 
 def _refit(candidate: Candidate, confirmation: Confirmation, size: Size | None = None) -> dict[str, Any]:

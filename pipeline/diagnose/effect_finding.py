@@ -69,15 +69,26 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
             alike = f"; these data would fit {listed(others)} as well" if others else ""
             size = stated(diagnosis, step, effect)
             return EffectFinding("present", f"step {number}: {size}{alike}")
-    for step in diagnosis.imitating:
-        for member, confirmation in step.chosen_from:
-            if member.effect.name == effect.name:
-                return EffectFinding("suspected", f"{NOT_EXPLAINED}: {sized_by_refit(effect, confirmation)}")
+    imitating = improves_the_fit(diagnosis).get(effect.name)
+    if imitating is not None:
+        return EffectFinding("suspected", imitating)
     for immaterial in diagnosis.immaterial:
         for member, confirmation in immaterial.chosen_from:
             if member.effect.name == effect.name:
                 return EffectFinding("immaterial", f"{sized_by_refit(effect, confirmation)}; {changes(immaterial)}")
     return None
+
+
+def improves_the_fit(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return why effects that improve the fit alone are suspected, by name.
+
+    An effect in two such steps has the size of the first.
+    """
+    why: dict[str, str] = {}
+    for step in diagnosis.imitating:
+        for member, confirmation in step.chosen_from:
+            why.setdefault(member.effect.name, f"{NOT_EXPLAINED}: {sized_by_refit(member.effect, confirmation)}")
+    return why
 
 
 def changes(immaterial: Immaterial) -> str:

@@ -18,7 +18,9 @@ from kempf.pipeline.diagnose.misfit import misfit_of
 from kempf.pipeline.diagnose.unmodelled_acceleration import unmodelled_acceleration
 from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.agreement import Agreement, agreement_of
+from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.predict.median_error import median_error
 from kempf.pipeline.predict.run_residuals import PhaseInterval
 from kempf.pipeline.predict.smoothed_states import smoothed_states
 from kempf.pipeline.shooting.ahead import Ahead
@@ -120,8 +122,11 @@ class _Judged:
 def _fitted_parameters(step: Step, plain: Agreement, workers: Executor) -> tuple[FittedParameter, ...]:
     """Return the parameters of hull and effects with their standard errors, as a parameter set states them."""
     stated = with_instants(step.fit, workers)
-    agreement = agreement_of(stated.fit) if step.fit.ship.model.effects else plain
-    ship = stated.fit.ship_part(agreement.widened**2 * stated.fit.covariance + stated.covariance)
+    if step.fit.ship.model.effects:
+        covariance = agreement_of(stated.fit).widened ** 2 * stated.fit.covariance + stated.covariance
+    else:
+        covariance = plain.widened**2 * (uncertainty_of(step.fit).covariance + stated.covariance)
+    ship = stated.fit.ship_part(covariance)
     return _parameters(ship.model, ship.parameters, ship.std)
 
 
@@ -139,7 +144,7 @@ def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, 
     intensities = zip(_DISTURBANCES, step.intensities, first.intensities, used, strict=True)
     fitted, held_out = (np.array([run.relative_error for run in runs]) for runs in step.free_runs(by_legs=by_legs))
     # with the parameters fitted to legs the median, as the sentences: free runs of a ship that keeps no course run off
-    middle = _median if by_legs else _mean
+    middle = median_error if by_legs else _mean
     return FittedModel(
         effects=tuple(effect.title for effect in step.fit.model.ship.effects),
         # the diagnosed model is no step of the search, but as a rung it has one effect more than the one below
@@ -162,11 +167,6 @@ def _model(step: Step, first: Step, diagnosis: Diagnosis, workers: Executor, *, 
 
 def _mean(errors: Float) -> float:
     return float(np.mean(errors))
-
-
-def _median(errors: Float) -> float:
-    middle = float(np.median(np.nan_to_num(errors, nan=np.inf)))
-    return middle if np.isfinite(middle) else np.nan
 
 
 def _leg_parameters(ahead: Ahead) -> tuple[FittedParameter, ...]:

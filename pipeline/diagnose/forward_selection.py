@@ -23,6 +23,8 @@ from kempf.schemas.effect import Effect
 _RACE, _TO_THE_END = 6, 60
 #: multiples of its typical size with which a lag begins beside an ordinary hull
 _LONGER = (1.0, 10.0, 30.0)
+#: see `kempf.pipeline.estimate.pooled_fit.swiftness`: twice that of the quickest vessels
+_QUICK = 15.0
 #: runs that the race goes over
 _RUNS_OF_RACE = 3
 #: intensities of what drives force, moment and current where an ordinary hull begins, SI
@@ -71,7 +73,7 @@ def added(
     else:
         hull = base.hull
     fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted, listener=listener)
-    if is_ship(base.hull) and is_ship(fitted.hull):
+    if is_ship(base) and is_ship(fitted):
         return fitted
     # what the score predicts beside such a hull says little, and the disturbances beside it have eaten the effect
     calm = replace(base, levels=calm_levels(base))
@@ -101,17 +103,14 @@ def _sizes(effect: Effect) -> list[Float]:
     return [np.array([size, *(steps[0] for steps in rest)]) for size in chosen]
 
 
-def is_ship(hull: Float) -> bool:
+def is_ship(fit: PooledFit) -> bool:
     """Return whether sway and yaw are damped, drift turns her away from the flow and the rudder turns her as it should.
 
-    A ship that does not keep a straight course by herself is one too.
-
-    Parameters
-    ----------
-    hull : ndarray, shape (6,)
+    And whether she answers as fast as vessels do. A ship that does not keep a straight course by herself is one too.
     """
-    a11, _, a21, a22, b1, b2 = (float(x) for x in hull)
-    return max(a11, a21, a22, b1) < 0.0 < b2
+    a11, _, a21, a22, b1, b2 = (float(x) for x in fit.hull)
+    quick = pooled_fit.swiftness(fit.hull, fit.runs[0].run.ship.length_m) > _QUICK
+    return max(a11, a21, a22, b1) < 0.0 < b2 and not quick
 
 
 def _climbed(

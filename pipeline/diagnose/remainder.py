@@ -56,7 +56,7 @@ def _unseen_by_reference(steps: Sequence[Step], before: RidgeReference | None) -
     if before is None or len(steps) < 2 or steps[1].stability is not None:
         return False
     # a hull that has bent to be no ship has made of the effect what neither it nor the reference is made of
-    if not is_ship(steps[0].fit.hull):
+    if not is_ship(steps[0].fit):
         return False
     foreseen = before.foreseen(steps[1].chosen_from[0][0].direction)
     # the log-likelihood that a signal is worth varies with noise by the root of twice what is to be expected of it

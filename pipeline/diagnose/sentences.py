@@ -13,10 +13,17 @@ from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
 from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
-from kempf.pipeline.diagnose.verdict import share_explained, verdict
+from kempf.pipeline.diagnose.verdict import share_explained, share_of_given, verdict
 from kempf.pipeline.predict.free_run import FreeRun
+from kempf.pipeline.predict.median_error import median_error
 from kempf.schemas.enumeration import listed
 
+#: so many free runs that leave the course are named
+_NAMED = 3
+#: of what is left where nothing is seen in it
+_LIKE_NOISE = (
+    "; what is left looks like noise: neither a known effect nor a smooth force of unknown origin improves on it"
+)
 #: said of the free runs of such a ship
 _UNSTABLE = (
     " She does not keep a straight course by herself, so that the free run of any model leaves hers: what counts is "
@@ -26,7 +33,7 @@ _UNSTABLE = (
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
     """Return what a person should read first, a sentence each."""
-    lines = []
+    lines = _given(diagnosis)
     outcome = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
         (candidate, _), *others = step.chosen_from
@@ -72,6 +79,23 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
+def _given(diagnosis: Diagnosis) -> list[str]:
+    """Say what the effects bring that the model has already."""
+    share = share_of_given(diagnosis)
+    if share is None:
+        return []
+    plain, now = diagnosis.given[0].ahead, diagnosis.steps[0].ahead
+    assert plain is not None
+    assert now is not None
+    titles = [effect.title for effect in now.model.effects]
+    return [
+        f"Already in the model: {listed(titles)}. Of the plain model's misfit (mean square) one leg ahead, in "
+        f"manoeuvres left out, {'this explains' if len(titles) == 1 else 'these explain'} {100.0 * share:.0f} %; the "
+        f"error goes from {np.mean(plain.percent(plain.left_out)):.1f} to "
+        f"{np.mean(now.percent(now.left_out)):.1f} % of the motion. What follows is about the rest."
+    ]
+
+
 def _left(diagnosis: Diagnosis) -> list[str]:
     """Say how much of what the last model leaves is noise, and where it sits."""
     if diagnosis.remaining is None:
@@ -109,12 +133,14 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     lines = [
         f"One leg ahead ({last.horizon_s:.3g} s) the error, of the motion, goes {listed(falls)}; left out, it goes "
         f"from {before[best]:.1f} to {after[best]:.1f} % in the manoeuvre that gains most, from {before[worst]:.1f} to "
-        f"{after[worst]:.1f} % in the one that gains least."
+        f"{after[worst]:.1f} % in the one that {'gains least' if after[worst] <= before[worst] else 'loses most'}."
     ]
     share = share_explained(diagnosis)
     if share is not None:
+        rest = "" if diagnosis.something_left or last.disagrees is not None else _LIKE_NOISE
         lines.append(
-            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained."
+            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained"
+            f"{rest}."
         )
     lines += _left(diagnosis)
     if last.disagrees is not None:
@@ -158,19 +184,19 @@ def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
         for name, a, b in zip(("fitted", "held-out"), before, after, strict=True)
         if b
     ]
-    off = sum(not run.relative_error < 1.0 for run in last.by_legs)
+    off = [run.name for run in last.by_legs if not run.relative_error < 1.0]
     sentence = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
     assert last.ahead is not None
     if not _keeps_course(last.ahead.fit.hull):
         sentence += _UNSTABLE
-    return (
-        f"{sentence} {off} of {len(last.by_legs)} free runs leave the measured course altogether." if off else sentence
-    )
+    if not off:
+        return sentence
+    which = f" ({listed(off)})" if len(off) <= _NAMED else ""
+    return f"{sentence} {len(off)} of {len(last.by_legs)} free runs leave the measured course altogether{which}."
 
 
 def _median(runs: Sequence[FreeRun]) -> str:
-    middle = float(np.median(np.nan_to_num([run.relative_error for run in runs], nan=np.inf)))
-    return _share(middle if np.isfinite(middle) else np.nan)
+    return _share(median_error(run.relative_error for run in runs))
 
 
 def _keeps_course(hull: Float) -> bool:

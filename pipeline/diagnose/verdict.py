@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Literal
 
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.shooting.ahead import Ahead
 
 Verdict = Literal["adequate", "explained", "ambiguous", "partly_explained", "unexplained", "insufficient_data"]
 
@@ -27,7 +29,16 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
 
 def share_explained(diagnosis: Diagnosis) -> float | None:
     """Return the part of the misfit one leg ahead, in manoeuvres left out, that the last model explains."""
-    first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
+    return _explained(diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead)
+
+
+def share_of_given(diagnosis: Diagnosis) -> float | None:
+    """Return the part of the plain model's misfit that the effects explain which the model had already."""
+    return _explained(diagnosis.given[0].ahead, diagnosis.steps[0].ahead) if diagnosis.given else None
+
+
+def _explained(first: Ahead | None, last: Ahead | None) -> float | None:
     if first is None or last is None or last is first:
         return None
-    return 1.0 - last.left_out.mean / first.left_out.mean
+    share = 1.0 - last.left_out.mean / first.left_out.mean
+    return share if isfinite(share) else None

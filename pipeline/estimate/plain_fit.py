@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate import maximum_likelihood
+from kempf.pipeline.estimate import maximum_likelihood, sensitivity
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.iteration import SILENT, Listener
@@ -23,6 +23,7 @@ from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, PooledFit, clim
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.block_arrow import Arrow
 from kempf.pipeline.estimate.search.climb import Search
+from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -121,22 +122,30 @@ def fit_plain(
             "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
             {"left_out": left_out},
         )
-    layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
-    levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
+    filtered = [RunFilter(single.run, EffectModel(), spec) for single in alone]
+    own_levels = np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])
+    levels = _first_levels(own_levels).ravel()
     mean = alone[0].hull if len(alone) == 1 else _weighted_mean(alone)
-    search = climbed(layout, np.concatenate([mean, levels]), listener=listener) if np.all(np.isfinite(mean)) else None
-    if search is None or not np.isfinite(search.log_likelihood):
+
+    def climbed_from(hull: Float) -> tuple[CommonLikelihood, Search[Arrow]]:
+        layout = CommonLikelihood(filtered, workers)
+        return layout, climbed(layout, np.concatenate([hull, levels]), listener=listener)
+
+    layout, search = climbed_from(mean)
+    if not np.isfinite(search.log_likelihood):
         # the mean is no ship: from the best of a few runs' own, then
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
-        search = climbed(layout, np.concatenate([best, levels]), listener=listener)
-    separate = sum(single.search.log_likelihood for single in alone)
+        layout, search = climbed_from(best)
+    # by the filter of the common fit: that of single runs differs from it by tenths of log-likelihood
+    points = [Point(single.hull, np.zeros(0), level) for single, level in zip(alone, own_levels, strict=True)]
+    separate = sum(passed.log_likelihood for passed in workers.map(sensitivity.passed, filtered, points))
     if not (search.converged and _agreement(alone, separate, search).p_value >= LEVEL):
         # runs that seem to be of two ships may have been climbed on a lower hill
-        hull = mariner_like(runs[0].ship.length_m).array()
-        other = climbed(layout, np.concatenate([hull, levels]), listener=listener)
-        if other.converged and other.log_likelihood > search.log_likelihood + _HIGHER:
-            search = other
+        beside, other = climbed_from(mariner_like(runs[0].ship.length_m).array())
+        instead = other.converged or not np.isfinite(search.log_likelihood)
+        if instead and other.log_likelihood > search.log_likelihood + _HIGHER:
+            layout, search = beside, other
     return PlainFit(ended(layout, search), alone, left_out, _agreement(alone, separate, search))
 
 

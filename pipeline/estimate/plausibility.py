@@ -13,6 +13,8 @@ _NOT_WHITE = 0.3
 _CHANCE = 3.0
 #: a 95 % interval that holds fewer than this share of the measurements is too narrow
 _TOO_FEW = 0.90
+#: standard errors beyond which a value has a sign
+_SIGN = 2.0
 
 
 def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
@@ -56,7 +58,10 @@ def plausibility_warnings(hull: Float, std: Float, fit: dict[str, Any]) -> tuple
     tuple of str
         One sentence each; empty where nothing speaks against it.
     """
-    a11, _, a21, a22, b1, b2 = (float(p) for p in hull)
+    # a sign is one only beyond the error
+    a11, _, a21, a22, b1, b2 = (
+        0.0 if abs(p) <= _SIGN * error else float(p) for p, error in zip(hull, std, strict=True)
+    )
     vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
     warnings = []
     if vague:

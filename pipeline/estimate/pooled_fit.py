@@ -29,6 +29,9 @@ DECREMENT = 1e-3
 MAX_ITERATIONS = 60
 #: largest change of an effect in one step of the search, in its own steps
 _REACH = 5.0
+#: no vessel answers faster than this, in her speed by her length: the quickest are at 8. A model that lacks, say, the
+#: lag of the rudder would have a hull of any quickness for it, and the climb there has no end
+SWIFTEST = 30.0
 #: slope beyond which there is none
 _STEEPEST = 1e100
 
@@ -247,7 +250,6 @@ def ended(layout: CommonLikelihood, search: Search[Arrow]) -> PooledFit:
     if np.isfinite(search.log_likelihood):
         covariance[np.ix_(index, index)] = inverse(complement)[np.ix_(index, index)] * np.outer(back, back)
     lines = layout.linearised_at(theta)
-    # of models with and without effects by the same filter, so that they can be compared
     value = sum(line.passed.log_likelihood for line in lines) if np.isfinite(search.log_likelihood) else -np.inf
     return PooledFit(
         model=layout.model,
@@ -264,11 +266,23 @@ def ended(layout: CommonLikelihood, search: Search[Arrow]) -> PooledFit:
     )
 
 
+def swiftness(hull: Float, length_m: float) -> float:
+    """Return how fast a hull answers, in speed by length: no less than the larger rate of its two modes.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+        Of eq. (16).
+    """
+    a11, a12, a21, a22 = hull[:4]
+    return float((abs(a11) + abs(a22) + np.sqrt(abs(a12 * a21))) * length_m)
+
+
 class CommonLikelihood:
     """The log-likelihood of several runs over one vector: hull, effects in units of their steps, six levels a run.
 
-    Without effects the model is linear, and its filter has derivatives in closed form: less than half of what the
-    extended one's differences cost, and the same to within a hundredth of a standard error (a test).
+    With and without effects by the same filter, so that models can be compared. A climb has one of its own: it leaves
+    out the derivatives of points that are no higher than its highest.
 
     Parameters
     ----------
@@ -282,7 +296,6 @@ class CommonLikelihood:
 
     def __init__(self, filtered: Sequence[RunFilter], workers: Executor, before: Parabola | None = None) -> None:
         self.filtered, self.workers, self.model = filtered, workers, filtered[0].model
-        self.linear = () if self.model.effects else tuple(run.linear() for run in filtered)
         self.shared = N_HULL + len(self.model.names)
         runs = len(filtered)
         # effects are counted in steps of a size that the search may take at once
@@ -314,17 +327,24 @@ class CommonLikelihood:
     def error_at(self, theta: Float) -> float:
         """Return the error one step ahead, see `one_step_error`.
 
-        By the extended filter also where the linear one climbs, so that models with and without effects can be
-        compared; at the highest point so far of the former it costs nothing.
+        At the highest point so far it costs nothing.
         """
         there = np.array_equal(theta, self.top)
         passes = [line.passed for line in self.lines] if there else self._passed(theta)
         return one_step_error([filtered.run for filtered in self.filtered], [passed.innovation for passed in passes])
 
     def full(self, theta: Float) -> tuple[float, Float, Arrow]:
-        """Log-likelihood, score and expected information, summed in the order of the runs."""
-        value, parts = self._linear(theta) if self.linear else self._extended(theta)
+        """Log-likelihood, score and expected information, summed in the order of the runs.
+
+        A search takes no step that does not rise above all before, so that nobody asks for the derivatives of a point
+        no higher than the highest: they are left at 0. None leads to a hull that answers faster than any vessel does:
+        there is no likelihood.
+        """
         s, runs = self.shared, len(self.filtered)
+        length_m = self.filtered[0].run.ship.length_m
+        if self.active[:N_HULL].any() and not swiftness(theta[:N_HULL], length_m) <= SWIFTEST:
+            return -np.inf, np.zeros(theta.size), _nothing(s, runs)
+        value, parts = self._summed(theta)
         scores, information = np.zeros((runs, s + N_LEVELS)), np.zeros((runs, s + N_LEVELS, s + N_LEVELS))
         for run, (own_score, own_information) in enumerate(parts):
             scores[run], information[run] = own_score, own_information
@@ -339,25 +359,8 @@ class CommonLikelihood:
             return -np.inf, np.zeros(theta.size), _nothing(s, runs)
         return value, score, arrow
 
-    def _linear(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
-        """Ask the linear filter of every run."""
-
-        def one(run: int) -> tuple[float, Float, Float]:
-            point, linear = self.point(theta, run), self.linear[run]
-            own = np.concatenate([point.hull, point.levels - to_intensities(linear.spec)])
-            return linear.full(np.clip(own, linear.low, linear.high))
-
-        answers = list(self.workers.map(one, range(len(self.linear))))
-        return sum(value for value, _, _ in answers) - self._loss(theta), [
-            (score, information) for _, score, information in answers
-        ]
-
-    def _extended(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
-        """Ask the extended filter of every run.
-
-        A search takes no step that does not rise above all before, so that nobody asks for the derivatives of a point
-        no higher than the highest: they are left at 0.
-        """
+    def _summed(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
+        """Return the log-likelihood of all runs, and score and information of each; none where nobody asks for them."""
         points = self._points(theta)
         begun = _begun(self.filtered, points, self.workers)
         value = sum(base.log_likelihood for base, _ in begun) - self._loss(theta)

@@ -16,12 +16,15 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.level_bounds import next_to_nothing
 from kempf.schemas.instrument_noise import lasting
 
 _ROOT_2 = float(np.sqrt(2.0))
 N_HULL, N_LEVELS = 6, 6
 #: steps of the differences: of hull parameters and effects in parts of a typical value, of a noise level's logarithm
 _HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
+#: part of a variance that a level's step adds to it
+_ADDED = float(np.expm1(2.0 * _LEVEL_STEP))
 #: of that of an effect, the least step of lasting noise
 _LEAST_STEP = 1e-2
 
@@ -82,8 +85,12 @@ def active(filtered: RunFilter) -> list[int]:
     return [*range(shared), *(shared + i for i, used in enumerate(filtered.levels_used()) if used)]
 
 
-def _steps(filtered: RunFilter, point: Point) -> Float:
-    """Return the step of every number of `Point.vector`; away from a bound where one is near."""
+def _steps(filtered: RunFilter, point: Point) -> tuple[Float, Float]:
+    """Return how far every number of `Point.vector` is moved, and by what the difference is divided.
+
+    Away from a bound where one is near. Near nothing innovations go with a level's square: by a part of its own size
+    they would move by less than the digits of a pass, so a level next to nothing is moved by a part of what is not.
+    """
     hull = _HULL_STEP * _typical(filtered, point)
     effects = []
     for (effect, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
@@ -92,7 +99,13 @@ def _steps(filtered: RunFilter, point: Point) -> Float:
             # an instrument's noise may be a small part of the usual, and what is measured goes with its square
             step = min(step, max(_EFFECT_STEP * abs(value), _LEAST_STEP * step))
         effects.append(-step if value + step > parameter.high else step)
-    return np.concatenate([hull, np.array(effects), np.full(N_LEVELS, _LEVEL_STEP)])
+    # the variance with the step, beside the one without it
+    least = next_to_nothing(filtered.spec)
+    small = least > point.levels
+    more = 1.0 + _ADDED * np.exp(2.0 * np.maximum(least - point.levels, 0.0))
+    by = np.where(small, 0.5 * np.log(more), _LEVEL_STEP)
+    divisor = np.where(small, 0.5 * (more - 1.0), _LEVEL_STEP)
+    return np.concatenate([hull, np.array(effects), by]), np.concatenate([hull, np.array(effects), divisor])
 
 
 def _typical(filtered: RunFilter, point: Point) -> Float:
@@ -112,20 +125,20 @@ def columns(filtered: RunFilter, point: Point, base: Passed, wanted: Sequence[in
     wanted : sequence of int
         Places in `Point.vector`.
     """
-    by = _steps(filtered, point)[list(wanted)].tolist()
-    return _differences(base, passes(filtered, _beside(point, wanted, by)), by)
+    by, divisors = (part[list(wanted)].tolist() for part in _steps(filtered, point))
+    return _differences(base, passes(filtered, _beside(point, wanted, by)), divisors)
 
 
 def with_columns(filtered: RunFilter, point: Point, wanted: Sequence[int]) -> tuple[Passed, list[Float]]:
     """Return the pass at a point and columns of J, as `columns` does: together in lanes, which costs a pass less."""
-    by = _steps(filtered, point)[list(wanted)].tolist()
+    by, divisors = (part[list(wanted)].tolist() for part in _steps(filtered, point))
     base, *others = passes(filtered, [point, *_beside(point, wanted, by)])
-    return base, _differences(base, others, by)
+    return base, _differences(base, others, divisors)
 
 
 def _beside(point: Point, wanted: Sequence[int], by: Sequence[float]) -> list[Point]:
     return [point.moved(index, step) for index, step in zip(wanted, by, strict=True)]
 
 
-def _differences(base: Passed, others: Sequence[Passed], by: Sequence[float]) -> list[Float]:
-    return [difference(base, other, step) for other, step in zip(others, by, strict=True)]
+def _differences(base: Passed, others: Sequence[Passed], divisors: Sequence[float]) -> list[Float]:
+    return [difference(base, other, divisor) for other, divisor in zip(others, divisors, strict=True)]

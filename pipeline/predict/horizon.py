@@ -24,6 +24,11 @@ class Horizon:
     seconds: float | None = None
 
     @property
+    def runs_freely(self) -> bool:
+        """Whether the prediction takes no measurement in."""
+        return self.kind in ("free run", "free run, fitted to legs")
+
+    @property
     def words(self) -> str:
         """As a person reads it."""
         return self.kind if self.seconds is None else f"{self.seconds:g} s ahead"

@@ -107,9 +107,9 @@ def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
     ship = sailed("rudder_lag", seed=5)
     chosen, _ = split(ship.runs)
     bent = fit_plain([ship.runs[i] for i in chosen], ship.spec, WORKERS).fit
-    assert not is_ship(bent.hull)
+    assert not is_ship(bent)
     found = added(bent, score(bent, effects.get("rudder_lag"), WORKERS), WORKERS)
-    assert is_ship(found.hull)
+    assert is_ship(found)
     assert found.log_likelihood > bent.log_likelihood + 300.0
     assert abs(found.values[0] - ship.c) < 3.0 * found.std[6]
 
@@ -355,11 +355,17 @@ def test_what_only_improves_the_fit_is_suspected(folds: list[float], held_out: l
 
 @pytest.mark.parametrize("wrong", range(6))
 def test_a_hull_of_which_a_sign_is_wrong_is_no_ship(wrong: int) -> None:
+    run = SimpleNamespace(ship=SimpleNamespace(length_m=1.0))
     hull = np.array([-0.7, -0.3, -3.8, -4.0, -0.36, 2.7])
-    assert is_ship(hull)
+    fit = cast(PooledFit, SimpleNamespace(hull=hull, runs=[SimpleNamespace(run=run)]))
+    assert is_ship(fit)
+    # of the same numbers a longer one would answer faster than vessels do
+    run.ship.length_m = 3.0
+    assert not is_ship(fit)
+    run.ship.length_m = 1.0
     hull[wrong] *= -1.0
     # a12 may have either sign
-    assert is_ship(hull) == (wrong == 1)
+    assert is_ship(fit) == (wrong == 1)
 
 
 def test_what_raced_in_vain_races_no_more(monkeypatch: pytest.MonkeyPatch) -> None:

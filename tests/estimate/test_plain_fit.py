@@ -14,15 +14,15 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.agreement import LEVEL
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.level_bounds import next_to_nothing, to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
 from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain, off_in_std
-from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, linearise
+from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, linearise, swiftness
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.estimate.search.climb import free
 from kempf.pipeline.model.effect_model import EffectModel
-from kempf.schemas.effects import get
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
 from tests.estimate.simulated import instruments_of, record_of, sailed, truth_of
@@ -93,7 +93,7 @@ def test_one_run_by_itself_is_the_estimate_of_that_run() -> None:
     alone = identify(record_of(trial), SPEC, trial.truth.wind_arm_per_m, STANDARD, 90.0)
     common = fitted(run(21))
     assert common.agreement.statistic == pytest.approx(0.0, abs=1e-3) and common.agreement.p_value == 1.0
-    assert np.max(np.abs(common.fit.hull - alone.hull.array()) / common.fit.std) < 0.01
+    assert np.max(np.abs(common.fit.hull - alone.hull.array()) / common.fit.std) < 0.05
 
 
 def test_the_workers_do_not_matter_to_the_bits() -> None:
@@ -104,21 +104,56 @@ def test_the_workers_do_not_matter_to_the_bits() -> None:
 
 
 def test_linear_and_extended_filter_have_one_maximum(three: PlainFit) -> None:
-    """An effect that is held at nothing sends the same measurements through the extended filter."""
+    """Of single runs the linear filter finds it, of several the extended one."""
     fit = three.fit
-    model = EffectModel((get("sway_quadratic"),))
-    theta = np.concatenate([fit.hull, [0.0], fit.levels.ravel()])
+    theta = np.concatenate([fit.hull, fit.levels.ravel()])
     with ThreadPoolExecutor(2) as workers:
-        extended = CommonLikelihood([replace(one, model=model) for one in fit.runs], workers)
-        value, score, information = extended.full(theta)
-        linear = CommonLikelihood(fit.runs, workers)
-        assert linear.linear and not extended.linear
-        assert value == pytest.approx(linear.full(np.delete(theta, 6))[0], abs=MOST_APART)
+        extended = CommonLikelihood(fit.runs, workers)
+        value, _, information = extended.full(theta)
+    score, linear_value = np.zeros(theta.size), 0.0
+    for number, one in enumerate(fit.runs):
+        linear, own = one.linear(), slice(6 + 6 * number, 12 + 6 * number)
+        there = np.concatenate([fit.hull, fit.levels[number] - to_intensities(one.spec)])
+        run_value, run_score, _ = linear.full(np.clip(there, linear.low, linear.high))
+        linear_value += run_value
+        score[:6] += run_score[:6]
+        score[own] = run_score[6:]
+    assert value == pytest.approx(linear_value, abs=MOST_APART)
     movable = free(extended, theta, score)
-    movable[6] = False
-    # where the extended filter's maximum lies, in standard errors from that of the linear one
+    # where the linear filter's maximum lies, in standard errors from that of the extended one
     step = information.masked(movable).solve(np.where(movable, score, 0.0))[:6]
     assert np.max(np.abs(step) / fit.std) < 0.05
+
+
+def test_a_level_that_has_sunk_to_nothing_keeps_its_derivative(three: PlainFit) -> None:
+    """By its square: there innovations are linear in it, however small it is."""
+    filtered, point = three.fit.runs[0], three.fit.point(0)
+    by_square = []
+    for below in (0.5, 2.0, 4.0):
+        levels = point.levels.copy()
+        levels[0] = next_to_nothing(filtered.spec)[0] - below
+        at = replace(point, levels=levels)
+        base = sensitivity.passed(filtered, at)
+        (column,) = sensitivity.columns(filtered, at, base, [sensitivity.N_HULL])
+        by_square.append(column / np.exp(2.0 * levels[0]))
+    assert np.max(np.abs(by_square[0])) > 0.0
+    for other in by_square[1:]:
+        np.testing.assert_allclose(other, by_square[0], atol=1e-2 * float(np.max(np.abs(by_square[0]))))
+
+
+def test_a_climb_does_not_leave_for_hulls_that_no_vessel_has(three: PlainFit) -> None:
+    length_m, hull = run(21).ship.length_m, three.fit.hull
+    assert 1.0 < swiftness(hull, length_m) < 8.0
+    poles = np.linalg.eigvals(hull[:4].reshape(2, 2) * length_m)
+    assert np.max(np.abs(poles)) <= swiftness(hull, length_m)
+    with ThreadPoolExecutor(2) as workers:
+        common = CommonLikelihood(three.fit.runs, workers)
+        quick = np.concatenate([hull * np.array([40.0, 1.0, 1.0, 40.0, 1.0, 1.0]), three.fit.levels.ravel()])
+        value, score, _ = common.full(quick)
+        assert value == -np.inf and not score.any()
+        # a hull that is held is the caller's
+        common.active[: common.shared] = False
+        assert np.isfinite(common.full(quick)[0])
 
 
 def test_standard_errors_grow_where_prediction_errors_are_not_white(three: PlainFit) -> None:

@@ -116,7 +116,11 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         or candidate["verdict"] in ("present", "immaterial", "negligible")
         or candidate["score"] is not None
     ]
-    shown = shown if everything else shown[:_SHOWN]
+    if not everything:
+        # what is claimed, and then what scores highest
+        claimed = [one for one in shown if one["verdict"] in ("present", "immaterial")]
+        others = [one for one in shown if one not in claimed][: max(_SHOWN - len(claimed), 0)]
+        shown = [one for one in shown if one in claimed or one in others]
     rows = [
         [
             candidate["effect"],

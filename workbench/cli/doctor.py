@@ -55,7 +55,9 @@ def print_examination(name: str, content: dict[str, Any], *, everything: bool) -
     """Print a verdict with its evidence and the lines that correct it."""
     findings = content["findings"]
     many = f"{len(findings)} contradiction{'' if len(findings) == 1 else 's'} between its channels"
-    click.echo(f"{one_line(name)}: {_HEADS[content['verdict']].format(many)}")
+    verdict = content["verdict"]
+    head = "partly tested" if verdict == "clean" and content["untested"] else verdict
+    click.echo(f"{one_line(name)}: {_HEADS[head].format(many)}")
     for k, finding in enumerate(findings, start=1):
         click.echo(f"{k}. {finding['words']}")
         for outcome in finding["evidence"]:
@@ -65,6 +67,8 @@ def print_examination(name: str, content: dict[str, Any], *, everything: bool) -
                 click.echo(f"   profile: {line}")
             if not fault["profile"]:
                 click.echo(f"   profile: no entry corrects it ({fault['words']}): correct it at the recorder")
+    if any(fault["profile"] for finding in findings for fault in finding["faults"]):
+        click.echo(_WHERE)
     if content.get("why"):
         click.echo(one_line(content["why"])[:600])
     if everything:
@@ -88,10 +92,18 @@ def _untested(content: dict[str, Any]) -> list[str]:
 
 _HEADS = {
     "clean": "the channels agree",
+    "partly tested": "the channels that could be tested agree",
     "faults": "{}",
     "untested": "nothing could be tested",
     "failed": "the doctor failed",
 }
+
+
+#: Where a proposed line belongs.
+_WHERE = (
+    "a profile line belongs under `channels:`, in the entry of `sources:` that reads the log, in place of one of its "
+    "name"
+)
 
 
 def _table(content: dict[str, Any]) -> None:

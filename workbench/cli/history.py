@@ -92,6 +92,8 @@ def command(
     if not changes:
         _show(histories, as_json=as_json)
         if not as_json:
+            if vessel and instant is None:
+                _say_which_fit(warehouse, histories)
             _show_notes(warehouse, list(histories), instant)
         return
     kinds = {name: history.comparable(warehouse, name, instant) for name in histories}
@@ -182,6 +184,17 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
     for vessel, model, estimator in sorted(series, key=lambda kind: (order.index(kind[0]), kind)):
         title = f"{vessel}, model {model}, estimator {estimator}"
         print_table(["start UTC", "parameter", "value", "std", "unit", "set"], series[vessel, model, estimator], title)
+
+
+def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> None:
+    """Say of the current sets that are listed where predictions take other parameters than these."""
+    from kempf.warehouse import aliases, parameter_sets
+    from kempf.workbench.parameter_set_table import tell_by_likelihood
+
+    for name, vessel_history in histories.items():
+        current = aliases.of_vessel(warehouse, name).get(aliases.CURRENT)
+        if current is not None and current in vessel_history.frame["parameter_set_id"].unique().to_list():
+            tell_by_likelihood(parameter_sets.get(warehouse, current, name))
 
 
 def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import nan
 from typing import Any
 
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.report.numbers import in_degrees
 from kempf.workbench.rungs import Rung, Size, compared, in_words, remarks
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
@@ -56,6 +58,8 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     head = ["step", "added", "size, ± 1 s.e.", *LEG, *FREE, "wind, m/s^2/s^0.5", "set"]
     print_table(head, rows, f"{vessel}: error, % of the motion")
     print_by_legs(beside)
+    if len([rung for rung in beside if rung.sizes]) > 1:
+        click.echo("  a size is that of its step's model; what the last model says of all: kempf params show")
 
 
 def percents(errors: Rung) -> list[str]:
@@ -71,5 +75,5 @@ def print_by_legs(rungs: Sequence[Rung]) -> None:
 
 
 def _size(size: Size) -> str:
-    unit = "" if size.unit in ("", "1") else f" {size.unit}"
-    return f"{size.name} {number(size.value)} ± {number(size.std, 2)}{unit}"
+    value, std, unit = in_degrees(size.value, nan if size.std is None else size.std, size.unit)
+    return f"{size.name} {number(value)} ± {number(std, 2)}{'' if unit in ('', '1') else f' {unit}'}"

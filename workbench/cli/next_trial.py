@@ -44,10 +44,10 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
         row = [
             f"{sailed['heading_deg']:g}/{sailed['rudder_deg']:g}{' *' if trial['beyond_what_was_sailed'] else ''}",
             number(trial["duration_s"], 3),
-            " x ".join(f"{x:.0f}" for x in trial["sea_room_m"]),
+            " x ".join(f"{x:g}" for x in trial["sea_room_m"]),
             number(100.0 * trial["mean_narrowed"], 3),
         ]
-        row += [number(100.0 * trial["probability"], 3)] if parting else []
+        row += [f"{100.0 * trial['probability']:.1f}"] if parting else []
         if parameter is not None:
             times = trial["times_to_halve"]
             row += [number(100.0 * trial["narrowed"][parameter], 3), "more than 64" if times is None else str(times)]

@@ -106,10 +106,10 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     without dimension too, with K' = K L/V and T' = T V/L of their hulls.
     """
     from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.leg_fit import by_name
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
+    from kempf.workbench.parameter_set_table import tell_by_likelihood
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
@@ -124,11 +124,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
         words = "Without their dimension, as ships of other sizes are compared; K' and T' of the hull alone:"
         print_table(head, _difference_rows(document["nondimensional"]), words)
     for each in (one, other):
-        if by_name(each):
-            click.echo(
-                f"  {each.parameter_set_id}: by the likelihood's parameters; predictions take those fitted to legs "
-                "(kempf params show)"
-            )
+        tell_by_likelihood(each)
 
 
 def _difference_rows(differences: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:

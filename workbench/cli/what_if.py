@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import isnan
+
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
@@ -14,7 +16,10 @@ from kempf.workbench.terminal import number, print_json, print_paragraph, print_
 @vessel_option(required=True)
 @click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
 @click.option(
-    "--segment", "segment_id", metavar="ID", help="Manoeuvre run freely; default: the one that is predicted worst."
+    "--segment",
+    "segment_id",
+    metavar="ID",
+    help="Manoeuvre run freely; default: the one that is predicted worst, of those held out where there are any.",
 )
 @warehouse_option
 @json_option
@@ -35,13 +40,13 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
         [
             number(t.value),
             number(t.in_std, 2),
-            number(t.log_likelihood_falls_by, 3),
+            "-" if isnan(t.log_likelihood_falls_by) else f"{-t.log_likelihood_falls_by:+.3g}",
             number(t.free_run_error_percent, 3),
         ]
         for t in answer.tried
     ]
     print_table(
-        [f"{parameter}, {answer.unit}", "standard errors away", "log-likelihood falls by", "free-run error, %"],
+        [f"{parameter}, {answer.unit}", "standard errors away", "log-likelihood changes by", "free-run error, %"],
         rows,
         f"{answer.parameter_set.parameter_set_id} of {vessel}, {answer.run.segment.segment_id} run freely",
     )

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from math import degrees, floor, isfinite, log10
+from math import degrees, floor, isfinite, log10, pi
 
 
 def in_degrees(value: float, std: float, unit: str) -> tuple[float, float, str]:
-    """Return a value, its error and its unit, angles in degrees.
+    """Return a value, its error and its unit, angles in degrees; whole turns of a direction do not count.
 
     Examples
     --------
-    >>> in_degrees(0.5, 0.25, "m/s")
-    (0.5, 0.25, 'm/s')
+    >>> in_degrees(0.5, 0.25, "m/s"), in_degrees(2.5 * pi, 0.0, "rad")
+    ((0.5, 0.25, 'm/s'), (90.0, 0.0, 'deg'))
     """
+    if unit == "rad" and abs(value) > 2.0 * pi:
+        value %= 2.0 * pi
     if unit in ("rad", "rad/s", "rad/s^2"):
         return degrees(value), degrees(std), unit.replace("rad", "deg")
     if unit == "s/rad":

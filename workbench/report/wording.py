@@ -111,11 +111,19 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequenc
         "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
         "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
-        "unexplained": f"Even with {listed(has)} in the model a systematic misfit remains that no known effect "
-        "accounts for."
+        "unexplained": f"{_share_before(content, has)} a systematic misfit remains that no known effect accounts for."
         if has
         else f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
     }[verdict]
+
+
+def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
+    """Return what the effects bring that the model has already, the beginning of a sentence."""
+    share = content.get("share_explained_before")
+    if share is None:
+        return f"Even with {listed(has)} in the model"
+    explained = f"{100.0 * share:.0f} % of the plain model's misfit one leg ahead"
+    return f"With {listed(has)} the model explains {explained}; beside it"
 
 
 def _share(content: Mapping[str, Any]) -> str:

@@ -73,8 +73,8 @@ def _extremes(time: Nanoseconds, value: Float, start_utc_ns: int, end_utc_ns: in
     low, high = _of_blocks(value, length)
     width = end_utc_ns - start_utc_ns + 1
     edges = start_utc_ns - (-np.arange(bins) * width) // bins
-    begins = np.unique(np.searchsorted(time[::length], edges))
-    begins = begins[begins < low.size]
+    begins = np.searchsorted(time[::length], edges)
+    begins = begins[(np.diff(begins, prepend=-1) > 0) & (begins < low.size)]
     first = low[_first(np.minimum, value[low], begins)]
     return _in_order(first, high[_first(np.maximum, value[high], begins)])
 
@@ -93,7 +93,7 @@ def _of_blocks(value: Float, length: int) -> tuple[Places, Places]:
 
 def _first(extreme: np.ufunc, value: Float, begins: Places) -> Places:
     """Return the place of the extreme of every stretch that begins at some places, the first of equal ones."""
-    counts = np.diff(np.append(begins, value.size))
+    counts = np.diff(begins, append=value.size)
     at = np.flatnonzero(value == np.repeat(extreme.reduceat(value, begins), counts))
     result: Places = at[np.searchsorted(at, begins)]
     return result
@@ -109,4 +109,6 @@ def _in_order(first: Places, second: Places) -> Places:
 def _broken(seconds: Float, value: Float, limit_s: float) -> tuple[Float, Float]:
     """Put a NaN between neighbours that are farther apart than a limit."""
     gaps = np.flatnonzero(np.diff(seconds) > limit_s) + 1
-    return np.insert(seconds, gaps, seconds[gaps - 1] if gaps.size else seconds[:0]), np.insert(value, gaps, np.nan)
+    if not gaps.size:
+        return seconds, value
+    return np.insert(seconds, gaps, seconds[gaps - 1]), np.insert(value, gaps, np.nan)

@@ -9,7 +9,7 @@
     for (const line of figure.querySelectorAll(".line-try")) line.classList.toggle("chosen", line.classList.contains(`try-${at}`));
     rows.forEach((row, k) => { if (k === at) row.setAttribute("aria-current", "true"); else row.removeAttribute("aria-current"); });
     const cells = Array.from(rows[at].children, cell => cell.textContent);
-    said.textContent = `${cells[0]} (${cells[1]} standard errors away): log-likelihood falls by ${cells[2]}, free-run error ${cells[3]} %`;
+    said.textContent = `${cells[0]} (${cells[1]} standard errors away): log-likelihood changes by ${cells[2]}, free-run error ${cells[3]} %`;
     slider.setAttribute("aria-valuetext", said.textContent);
   }
   figure.classList.add("one-at-a-time");
