@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import radians
+from math import hypot, radians
 from typing import Any
 
 from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
@@ -45,10 +45,24 @@ class Beside:
         low, high = self.predicted.low, self.predicted.high
         return None if low is None or high is None else low <= self.measured <= high
 
+    @property
+    def agrees(self) -> bool | None:
+        """Whether measured and predicted differ by no more than both intervals allow together; None without one.
+
+        The halves towards each other, added as independent errors are; of a measurement without an interval none.
+        """
+        value, low, high = self.predicted.value, self.predicted.low, self.predicted.high
+        if value is None or low is None or high is None:
+            return None
+        above = self.measured >= value
+        own = high - value if above else value - low
+        end = self.measured_low if above else self.measured_high
+        return abs(self.measured - value) <= hypot(own, 0.0 if end is None else self.measured - end)
+
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
         measured = {"measured": self.measured, "measured_low": self.measured_low, "measured_high": self.measured_high}
-        return {"figure": self.name, **measured, **vars(self.predicted), "inside": self.inside}
+        return {"figure": self.name, **measured, **vars(self.predicted), "inside": self.inside, "agrees": self.agrees}
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.pipeline.segment.imo import SHORTEST_SHIP_M, overshoot_limits
+from kempf.pipeline.segment.imo import SHORTEST_SHIP_M, SLOWEST_SHARE, overshoot_limits
 
 #: in ship lengths: 5.3.1 and 5.3.2
 ADVANCE, TACTICAL_DIAMETER, INITIAL_TURNING = 4.5, 5.0, 2.5
@@ -35,7 +35,11 @@ class Judged:
 
 
 def judge(
-    manoeuvre: Manoeuvre, samples: Mapping[str, Float], length_m: float | None, speed_m_s: float
+    manoeuvre: Manoeuvre,
+    samples: Mapping[str, Float],
+    length_m: float | None,
+    speed_m_s: float,
+    trial_speed_m_s: float | None = None,
 ) -> tuple[Judged, ...]:
     """Judge a manoeuvre by the criteria that apply to it.
 
@@ -47,13 +51,24 @@ def judge(
         Between perpendiculars, of the profile.
     speed_m_s : float
         Of the approach.
+    trial_speed_m_s : float, optional
+        Of the profile: the standard asks for nine tenths of it at least.
     """
     criteria = _criteria(manoeuvre, length_m, speed_m_s)
     short = "" if length_m is None or length_m >= SHORTEST_SHIP_M else _short(length_m)
+    slow = ""
+    if trial_speed_m_s is not None and speed_m_s < SLOWEST_SHARE * trial_speed_m_s:
+        slow = (
+            f"at {speed_m_s:.3g} m/s, below {100 * SLOWEST_SHARE:.0f} % of the trial speed {trial_speed_m_s:g} m/s, "
+            "which the standard asks for"
+        )
+    unknown = "the length of the ship is not known: give it in the profile"
     return tuple(
-        Judged(name, limit, unit, float(np.mean(samples[figure] <= limit)), note or short)
+        Judged(
+            name, limit, unit, float(np.mean(samples[figure] <= limit)), "; ".join(filter(None, (note, short, slow)))
+        )
         if limit is not None
-        else Judged(name, None, unit, None, "the length of the ship is not known: give it in the profile")
+        else Judged(name, None, unit, None, short or unknown)
         for name, figure, limit, unit, note in criteria
     )
 
@@ -74,7 +89,9 @@ def _criteria(
         return []
     angles = tuple(round(float(np.degrees(a)), 6) for a in (manoeuvre.heading_rad, manoeuvre.rudder_rad))
     if angles == (10.0, 10.0):
-        first, second = overshoot_limits(length_m, speed_m_s) if length_m else (None, None)
+        # the limits go with the seconds that a ship takes for her length: those of a model are not its ship's
+        limited = length_m is not None and length_m >= SHORTEST_SHIP_M
+        first, second = overshoot_limits(length_m, speed_m_s) if length_m and limited else (None, None)
         return [
             ("initial turning", "initial_turning_m", lengths(INITIAL_TURNING), "m", ""),
             ("10/10 first overshoot", "overshoots_deg.0", first, "deg", ""),

@@ -94,6 +94,7 @@ def predict(
     logs: Reach,
     length_m: float | None,
     count: int = DRAWS,
+    trial_speed_m_s: float | None = None,
 ) -> Prediction:
     """Predict a manoeuvre.
 
@@ -108,6 +109,8 @@ def predict(
         Of the profile, for the criteria.
     count : int, optional
         Ships drawn from every model, a power of two.
+    trial_speed_m_s : float, optional
+        Of the profile, for the criteria.
 
     Raises
     ------
@@ -127,7 +130,7 @@ def predict(
         figures_of(first, sailing),
         sailing,
         beyond(first.reach, logs),
-        judge(manoeuvre, samples, length_m, speed),
+        judge(manoeuvre, samples, length_m, speed, trial_speed_m_s),
         tuple(model.model for model in every if not model.sails),
     )
 

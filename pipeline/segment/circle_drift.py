@@ -1,7 +1,8 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
 A uniform current sets her so, and a steady wind. A water log separates the two: over ground she is faster than
-through the water when she heads with a current, while a wind changes both speeds alike.
+through the water when she heads with a current, while a wind changes both speeds alike. So it shows the current of a
+circle, too, that is too short for two passages of many headings.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from math import hypot, pi, sin, sqrt
 
 import numpy as np
 
+from kempf.pipeline.channels.series import Mask
 from kempf.pipeline.segment.turn_track import TurnTrack
 
 #: Heading change from which on passages are compared, at most over the last two turns, and the one a record must reach,
@@ -26,6 +28,10 @@ _APART_SHARE = 1.0 / 3.0
 _DYING, _SMALLEST_SHARE = 1.5, 0.25
 
 _STEP_RAD = float(np.deg2rad(2.0))
+
+#: Heading change from which on the water log shows a current by itself, rad, and the parts of it that are left out one
+#: after the other to see how well. Fewer readings than that show nothing.
+_LOGGED_FROM_RAD, _PARTS, _FEWEST = 5.0 * pi / 3.0, 8, 20
 
 
 @dataclass(frozen=True)
@@ -122,12 +128,55 @@ def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
         as the drift says, to within a third of it or two standard errors; False also where there is no water log.
     """
     known = (track.time_s >= execute_s) & np.isfinite(track.log_m_s)
-    if np.count_nonzero(known) < 20:
+    if np.count_nonzero(known) < _FEWEST:
         return False
-    heading = track.heading_rad[known]
-    difference = track.speed_m_s[known] * np.cos(track.drift_rad[known]) - track.log_m_s[known]
-    # the constant and the speed itself are the water log's bias and scale
-    basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), track.log_m_s[known]])
-    north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
+    north, east = _by_log(track, known)
     apart = hypot(float(north) - drift.north_m_s, float(east) - drift.east_m_s)
     return apart <= max(_APART_SHARE * drift.size_m_s, 2.0 * drift.std_m_s)
+
+
+def current_by_log(track: TurnTrack, execute_s: float, course_rad: float) -> CircleDrift | None:
+    """Estimate a uniform current by the water log, from speeds over ground and through the water.
+
+    Parameters
+    ----------
+    track : TurnTrack
+        Over ground, from the approach on, with the water log's speed.
+    execute_s : float
+        Instant of the execute, s.
+    course_rad : float
+        Heading of the approach, rad.
+
+    Returns
+    -------
+    CircleDrift or None
+        With the jackknife's standard error over the approach and eight parts of the turn (Efron & Stein 1981, Annals of
+        Statistics 9), what changes from part to part included. None where there is no water log, and for a heading
+        change of less than 300 deg.
+    """
+    known = np.isfinite(track.log_m_s) & np.isfinite(track.speed_m_s)
+    turned = np.abs(track.heading_rad - course_rad)
+    turned[track.time_s < execute_s] = -1.0
+    last = float(turned[-1])
+    if last < _LOGGED_FROM_RAD or np.count_nonzero(known) < _FEWEST:
+        return None
+    # the approach is a part of its own
+    part = np.where(turned < 0.0, _PARTS, np.minimum(turned * _PARTS / last, _PARTS - 1)).astype(np.int64)
+    parts = [number for number in range(_PARTS + 1) if np.any(known & (part == number))]
+    if len(parts) < _PARTS:
+        return None
+    without = np.array([_by_log(track, known & (part != number)) for number in parts])
+    scatter = np.sum((without - np.mean(without, axis=0)) ** 2, axis=0)
+    std = float(np.sqrt(np.max(scatter) * (len(parts) - 1) / len(parts)))
+    north, east = _by_log(track, known)
+    return CircleDrift(north, east, std)
+
+
+def _by_log(track: TurnTrack, known: Mask) -> tuple[float, float]:
+    """Return the current towards north and east by which speeds over ground and through the water differ, m/s."""
+    heading, log = track.heading_rad[known], track.log_m_s[known]
+    difference = track.speed_m_s[known] * np.cos(track.drift_rad[known]) - log
+    # the constant and the speed itself are the water log's bias and scale
+    basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), log])
+    north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
+    return float(north), float(east)

@@ -10,7 +10,7 @@ from math import nan, pi
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift, is_current
+from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift, current_by_log, is_current
 from kempf.pipeline.segment.figure import Figure
 from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD, TurningFigures, steady_span, turning_figures
@@ -93,7 +93,10 @@ def circle_figures(
     course = float(np.mean(track.heading_rad[before]))
     through_water = source == "speed through the water and heading"
     drift = None if source == "heading alone" or through_water else circle_drift(track, begin, course)
-    agreed = drift is not None and drift.seen and is_current(drift, track, begin)
+    by_passages = drift is not None
+    if drift is None and source != "heading alone" and not through_water:
+        drift = current_by_log(track, begin, course)
+    agreed = drift is not None and drift.seen and (not by_passages or is_current(drift, track, begin))
     freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
     corrected = freed if agreed else track
     over_ground, less_drift, corrected_figures = (
@@ -102,20 +105,9 @@ def circle_figures(
     if through_water:
         reasons.append("The track is made of the water log's speed along the heading: the drift angle is left out.")
     elif source != "heading alone" and drift is None:
-        reasons.append("The figures are over ground: less than 600 deg were turned, a current cannot be seen.")
+        reasons.append("The figures are over ground: less than 600 deg were turned, and no water log shows a current.")
     elif drift is not None:
-        towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
-        size = f"{drift.size_m_s:.3g} m/s towards {towards_deg:.0f} deg"
-        if agreed:
-            reasons.append(
-                f"The circle drifts by {size}, and so does the water, as the water log shows: it is taken off."
-            )
-        elif drift.seen:
-            reasons.append(f"The circle drifts by {size}; no water log shows a current: the figures are over ground.")
-        else:
-            reasons.append(
-                f"The circle drifts by less than {2.0 * drift.std_m_s:.2g} m/s: the figures are over ground."
-            )
+        reasons.append(_said_of(drift, agreed=agreed, by_passages=by_passages))
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
     spread = _steady_spread(corrected, begin, course, corrected_figures)
@@ -144,6 +136,20 @@ def circle_figures(
         approach_speed_trend_percent=_trend_percent(track.time_s[before], track.speed_m_s[before]),
         reasons=tuple(reasons),
     )
+
+
+def _said_of(drift: CircleDrift, *, agreed: bool, by_passages: bool) -> str:
+    """Say what became of a drift that passages of the same headings show, or of a current that the water log does."""
+    towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
+    size = f"{drift.size_m_s:.3g} m/s towards {towards_deg:.0f} deg"
+    if agreed and not by_passages:
+        return f"The water log shows a current of {size}: it is taken off."
+    if agreed:
+        return f"The circle drifts by {size}, and so does the water, as the water log shows: it is taken off."
+    if drift.seen:
+        return f"The circle drifts by {size}; no water log shows a current: the figures are over ground."
+    what = "The circle drifts by" if by_passages else "By the water log the current is"
+    return f"{what} less than {2.0 * drift.std_m_s:.2g} m/s: the figures are over ground."
 
 
 def _columns(track: TurnTrack) -> tuple[Float, Float, Float, Float, Float, Float]:

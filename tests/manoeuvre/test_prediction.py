@@ -86,6 +86,14 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     assert some.probability is not None
     assert 0.0 < some.probability < 1.0
     assert "100 m" in some.why
+    # of a model the limits of the overshoots are not those of its ship
+    small = {one.name: one for one in made(model, Zigzag(radians(10.0), radians(10.0)), 7.0).imo}
+    assert small["10/10 first overshoot"].probability is None
+    assert "7 m long" in small["10/10 first overshoot"].why
+    assert small["initial turning"].probability is not None
+    slow = predict([model], TurningCircle(radians(35.0)), LOGS, 160.93, 64, trial_speed_m_s=9.0).imo[0]
+    assert slow.probability == circle["advance"].probability
+    assert "below 90 % of the trial speed 9 m/s" in slow.why
 
 
 def test_a_ship_that_runs_away_is_refused_with_what_to_sail() -> None:

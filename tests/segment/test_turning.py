@@ -71,6 +71,27 @@ def test_figures_hold_the_truth_through_the_water(hull: str, rudder: float, envi
     assert figures["steady_drift_deg"].value == pytest.approx(drift, abs=1.5)
 
 
+@pytest.mark.parametrize(("hull", "rudder", "turn_deg"), [("ferry", 35.0, 380.0), ("mariner", -35.0, 340.0)])
+def test_of_one_turn_the_water_log_shows_the_current(hull: str, rudder: float, turn_deg: float) -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(rudder, turn_deg)), hull, STREAM, seed=3)
+    truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
+    circle = circle_of(find_turning(instruments(trial)))
+    assert circle.measured.corrected
+    assert any("water log shows a current of" in reason for reason in circle.quality.reasons)
+    assert circle.measured.drift is not None
+    off = np.hypot(circle.measured.drift.north_m_s - 0.5, circle.measured.drift.east_m_s + 0.4)
+    assert off < 3.0 * np.sqrt(2.0) * circle.measured.drift.std_m_s < 0.5
+    for name in LENGTHS:
+        figure = circle.measured.figures[name]
+        assert figure.value is not None
+        assert abs(figure.value - truth[name]) < 3.0 * figure.std, name
+    # over ground the tactical diameter is not hers
+    assert circle.measured.over_ground["tactical_diameter_m"] != pytest.approx(truth["tactical_diameter_m"], rel=0.03)
+    without = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
+    assert not without.measured.corrected
+    assert without.measured.drift is None
+
+
 def test_without_a_log_the_drift_is_said_and_left_in() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry", STREAM)
     circle = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))

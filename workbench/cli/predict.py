@@ -17,7 +17,7 @@ from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
+    from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
     from kempf.flows.jobs.predicted import Predicted
     from kempf.pipeline.manoeuvre.prediction import Figure
 
@@ -169,6 +169,12 @@ def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
     return [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
 
 
+def _with_half(beside: Beside) -> str:
+    """Return what was measured with half its own interval, where that is known."""
+    low, high = beside.measured_low, beside.measured_high
+    return number(beside.measured) + ("" if low is None or high is None else f" ± {number(0.5 * (high - low), 2)}")
+
+
 def _print_models(predicted: Predicted) -> None:
     first = next(iter(predicted.prediction.figures))
     words, unit = FIGURES[first.partition(".")[0]]
@@ -181,7 +187,7 @@ def _print_models(predicted: Predicted) -> None:
 
 def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     from kempf.flows.jobs.one_sided import one_sided
-    from kempf.workbench.documents.prediction import sentence_of
+    from kempf.workbench.documents.prediction import LACKS, MOST, sentence_of
 
     if not measured:
         print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
@@ -189,14 +195,14 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     rows = []
     for run in measured:
         for beside in run.figures:
-            figure, inside = beside.predicted, beside.show()["inside"]
+            figure = beside.predicted
             base, _, place = beside.name.partition(".")
             words = in_words(base, int(place) if place else None, {})
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
                 about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)
-                verdict = "yes" if inside else "no"
-                rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
+                verdict = "yes" if beside.inside else "by both" if beside.agrees else "no"
+                rows.append([*about, _with_half(beside), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
     print_table(
         head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
@@ -205,7 +211,13 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     judged = [entry for entry in shown if entry["inside"] is not None]
     if judged:
         inside = sum(entry["inside"] for entry in judged)
-        print_paragraph(f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction")
+        agree = sum(entry["agrees"] for entry in judged)
+        print_paragraph(
+            f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction; {agree} agree "
+            "with it by both intervals (± is half their own)"
+        )
+        if agree < MOST * len(judged):
+            print_paragraph(LACKS)
     for found in one_sided(measured):
         print_paragraph(sentence_of(found))
     for run in measured:

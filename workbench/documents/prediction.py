@@ -10,6 +10,13 @@ from kempf.flows.jobs.one_sided import OneSided, one_sided
 from kempf.flows.jobs.predicted import Predicted
 from kempf.workbench.manoeuvre_figures import in_words
 
+#: said where fewer than this share of measured figures agree with what is predicted
+MOST = 0.75
+LACKS = (
+    "intervals of predictions hold the errors of the parameters and the models that fit alike; what all of these "
+    "models lack is in none"
+)
+
 
 def sentence_of(found: OneSided) -> str:
     """Say that a figure is predicted too large in all measured manoeuvres, or too small in all."""
