@@ -46,7 +46,8 @@ def as_text(parameter_set: ParameterSet, form: str) -> str:
         writer.writerow(["parameter_set_id", "group", "name", "value", "std", "unit"])
         for group in ("parameters", "discrete", "noise"):
             for p in getattr(parameter_set, group):
-                writer.writerow([parameter_set.parameter_set_id, group, p.name, repr(p.value), repr(p.std), p.unit])
+                error = "" if p.std is None else repr(p.std)
+                writer.writerow([parameter_set.parameter_set_id, group, p.name, repr(p.value), error, p.unit])
         units = {p.name: p.unit for p in parameter_set.parameters}
         for name, (value, std) in by_name(parameter_set).items():
             row = [parameter_set.parameter_set_id, "fitted_to_legs", name, repr(value), repr(std), units[name]]

@@ -14,7 +14,8 @@ from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 def lasting_noise_of(fit: PooledFit) -> tuple[StoredValue, ...]:
     """Return the lasting noise of a fit, as ``process.parameter``."""
     return tuple(
-        StoredValue(name, value, std if np.isfinite(std) else None, unit) for name, value, std, unit in fit.noise
+        StoredValue(name, value, std if np.isfinite(std) and std > 0.0 else None, unit)
+        for name, value, std, unit in fit.noise
     )
 
 

@@ -13,7 +13,7 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
+from kempf.pipeline.diagnose.sizes import as_read, sized_by_refit, stated
 from kempf.schemas.effect import Effect
 from kempf.schemas.enumeration import listed
 
@@ -93,9 +93,11 @@ def improves_the_fit(diagnosis: Diagnosis) -> dict[str, str]:
 
 def changes(immaterial: Immaterial) -> str:
     """Say how little an effect changes."""
+    moved = 100.0 * immaterial.weight.shift
+    by = f"by more than {moved:.1f} % beyond its error" if moved >= 0.05 else "beyond its error"
     return (
         f"with it the misfit one leg ahead changes by {-100.0 * immaterial.weight.fall:+.1f} %, and no parameter of "
-        f"the hull moves by more than {100.0 * immaterial.weight.shift:.1f} % beyond its error"
+        f"the hull moves {by}"
     )
 
 
@@ -173,7 +175,8 @@ def _too_weak(candidate: Candidate) -> str:
     parameters = [p for p, m in zip(candidate.effect.parameters, known, strict=True) if m]
     reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
     if np.all(reach < POWER * candidate.std[known]):
-        error = f"{candidate.std[known][0]:.2g} {parameters[0].unit}".rstrip()
+        factor, unit = as_read(parameters[0].unit)
+        error = f"{factor * candidate.std[known][0]:.2g} {unit}".rstrip()
         return f"its standard error, {error}, is as large as any size that is physical."
     return ""
 
@@ -183,7 +186,8 @@ def _absent(candidate: Candidate) -> str:
     if not known[0]:
         return "not seen"
     limit = abs(candidate.change[0]) + 2.0 * candidate.std[0]
-    return f"not seen; upper limit (95 %): |{p.name}| < {limit:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
+    factor, unit = as_read(p.unit)
+    return f"not seen; upper limit (95 %): |{p.name}| < {factor * limit:.2g} {unit}".rstrip()
 
 
 def _percent(share: float) -> str:

@@ -155,7 +155,10 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
 def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
     force = last.intensities[0] / first.intensities[0]
-    disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
+    share = f"{100 * force:.0f}"
+    disturbance = "the intensity of the lateral disturbance " + (
+        "staying as it was." if share == "100" else f"to {share} % of what it was."
+    )
     if last.predicts_by_legs:
         return _fall_by_legs(first, last, disturbance)
     fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"

@@ -38,6 +38,19 @@ def sized_by_refit(effect: Effect, confirmation: Confirmation) -> str:
     return sized(effect, refitted_size(effect, confirmation))
 
 
+def as_read(unit: str) -> tuple[float, str]:
+    """Return the factor to the unit that people read an angle in, and that; of what has no dimension the unit is empty.
+
+    Examples
+    --------
+    >>> as_read("m/s"), as_read("1")
+    ((1.0, 'm/s'), (1.0, ''))
+    """
+    if unit in ("rad", "rad/s"):
+        return 180.0 / np.pi, unit.replace("rad", "deg")
+    return 1.0, "" if unit == "1" else unit
+
+
 def _with_size(effect: Effect, values: Float, std: Float) -> str:
     within = [v % (2.0 * np.pi) if p.is_direction else v for p, v in zip(effect.parameters, values, strict=True)]
     shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, within, std, strict=True)]
@@ -45,9 +58,9 @@ def _with_size(effect: Effect, values: Float, std: Float) -> str:
 
 
 def _shown(name: str, value: float, std: float, unit: str) -> str:
-    factor, shown = (180.0 / np.pi, unit.replace("rad", "deg")) if unit in ("rad", "rad/s") else (1.0, unit)
+    factor, shown = as_read(unit)
     digits = max(0, 1 - int(np.floor(np.log10(abs(std * factor))))) if np.isfinite(std) and std > 0.0 else 4
     digits = min(digits, 8)
     error = f" ± {std * factor:.{digits}f}" if np.isfinite(std) else ""
     note = " (1 s.e.)" if error else ""
-    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}{note}"
+    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown else ''}{note}"

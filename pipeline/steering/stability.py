@@ -25,6 +25,8 @@ Verdict = Literal["stable", "unstable", "cannot be determined from these data"]
 #: how sure a verdict must be
 CONFIDENCE = 0.95
 _LOG2_DRAWS = 14
+#: standard errors from which a determinant is not near zero
+_FAR = 2.0
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,9 @@ def _verdict(probability: float, determinant: float, std: float) -> tuple[Verdic
         return "stable", f"{where}; {chance}"
     if probability <= 1.0 - CONFIDENCE:
         return "unstable", f"{where}; {chance}"
-    return "cannot be determined from these data", f"{where}: too near to zero; {chance}"
+    # far from zero by its own error it may have either sign: a product of parameters is not spread evenly
+    why = "too near to zero" if abs(determinant) < _FAR * std else "the errors of its factors allow either sign"
+    return "cannot be determined from these data", f"{where}: {why}; {chance}"
 
 
 def _probability(p: Float, covariance: Float) -> float:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import sys
 from itertools import zip_longest
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 _CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
 #: probability below which a band or a correlation is shown
 _LEVEL = 0.01
+#: fit, %, below which a run has left the measured course
+_RUN_OFF = -100.0
 _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 
@@ -160,7 +163,7 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     head = ["manoeuvre", "what", "start UTC"]
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_display'][name]['unit']}"]
-    head += ["largest overshoot error deg"]
+    head += ["largest free-run overshoot error deg"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
         angles = f"{run['psi0_deg']:g}/{run['delta0_deg']:g}" if "zigzag" in run["kind"] else "random"
@@ -173,10 +176,8 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     for run in runs if verbose else ():
         every = " ".join(_signed(error) for error in run["overshoot_error_deg"])
         click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
-    fits = [mean["fit_percent"][name] for name in there]
-    parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
-    quoted_as = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
-    click.echo(f"  mean fit{quoted_as}: {', '.join(parts)}")
+    off = sum(any(_off(fit) for fit in run["fit_percent"].values()) for run in runs)
+    click.echo(f"  {_fits_together(runs, mean['fit_percent'], there, off)}")
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
         click.echo(
@@ -194,10 +195,24 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
         return
     by_likelihood = f"{_with_error(likelihood)} % with the likelihood's parameters"
     middle = "diverges" if legs["median"] is None else f"{legs['median']:.2f} %"
+    by_legs = f"median {middle}" if off else f"{_with_error(legs)} %, median {middle}"
     click.echo(
-        f"  free-run error (100 - fit %, mean over channels): {by_likelihood}, {_with_error(legs)} %, median "
-        f"{middle}, with those fitted to legs (--horizon legs), which predictions of manoeuvres take"
+        f"  free-run error (100 - fit %, mean over channels): {by_likelihood}, {by_legs}, with those fitted to legs "
+        "(--horizon legs), which predictions of manoeuvres take"
     )
+
+
+def _fits_together(runs: list[dict[str, Any]], mean: dict[str, Any], there: list[str], off: int) -> str:
+    """Return the fit over all runs, the mean; the median where runs have run off, so many."""
+    if off:
+        known = {name: [run["fit_percent"][name] for run in runs if name in run["fit_percent"]] for name in there}
+        middle = {name: median(-inf if fit is None else fit for fit in fits) for name, fits in known.items()}
+        parts = [f"{_CHANNELS[name]} {_percent(fit)} %" for name, fit in middle.items()]
+        return f"median fit: {', '.join(parts)}; {off} of {len(runs)} run off, so that a mean says nothing"
+    fits = [mean[name] for name in there]
+    parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
+    quoted_as = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
+    return f"mean fit{quoted_as}: {', '.join(parts)}"
 
 
 def _print_where(title: str, where: dict[str, Any]) -> None:
@@ -256,8 +271,13 @@ def _size(window: dict[str, Any]) -> str:
     return f"rms {number(window['free_run_rms'], 3)} {window['unit']}, {window['times_its_rms']:.1f} x"
 
 
+def _off(fit: float | None) -> bool:
+    """Return whether a run has left what was measured: its error is twice the motion."""
+    return fit is not None and fit < _RUN_OFF
+
+
 def _percent(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+    return "-" if value is None else "ran off" if _off(value) else f"{value:.2f}"
 
 
 def _signed(value: float | None) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,7 +13,10 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.rungs import compared, effect_names
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.terminal import counted, number, print_json, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from kempf.warehouse.store import Warehouse
 
 _SHOWN = 12
 
@@ -61,7 +65,26 @@ def command(
     if as_json:
         print_json(diagnosis.show())
         return
-    _print_diagnosis(diagnosis.show(), everything=everything)
+    document = diagnosis.show()
+    _print_diagnosis(document, everything=everything)
+    _print_at_hand(warehouse, document)
+    if document["sets"]:
+        click.echo(f"next: {', '.join(next_commands(document))}")
+
+
+def _print_at_hand(warehouse: Warehouse, document: Mapping[str, Any]) -> None:
+    """Say which manoeuvres that were kept for validation are there to hold models against that fit alike."""
+    from kempf.warehouse import segments
+
+    if not any(len(group["effects"]) > 1 for group in document["sets"]):
+        return
+    kept = Counter(segment.kind for segment in segments.every(warehouse, document["vessel"]))
+    for kind, words in (("turning_circle", "turning circle"), ("pull_out", "pull-out"), ("spiral", "spiral")):
+        if kept[kind]:
+            click.echo(
+                f"at hand, to hold models that fit alike against: {counted(kept[kind], words)} "
+                f"(kempf predict {words.replace(' ', '-')} --compare --vessel {document['vessel']})"
+            )
 
 
 def _fleet(uri: str, *, as_json: bool) -> None:
@@ -141,8 +164,6 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         click.echo(f"  {', '.join(effects)}: {why}")
     if not everything and len(document["candidates"]) > _SHOWN:
         click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
-    if document["sets"]:
-        click.echo(f"next: {', '.join(next_commands(document))}")
 
 
 def next_commands(document: Mapping[str, Any]) -> list[str]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.standing_model import rungs_to, standing
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import vessels
+from kempf.warehouse import aliases, vessels
 from kempf.warehouse.store import Warehouse
 
 
@@ -21,6 +22,8 @@ def ladder_document(warehouse: Warehouse, vessel: str) -> list[dict[str, Any]]:
     vessels.require(warehouse, vessel)
     model = standing(warehouse, vessel)
     if model is None:
+        if aliases.WITHDRAWN in aliases.of_vessel(warehouse, vessel):
+            chosen_set(warehouse, vessel)  # says what was withdrawn, and what brings it back
         raise NotFound(
             "no_model",
             f"{vessel!r} has no current model of several manoeuvres yet.",
