@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -212,10 +213,16 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     if judged:
         inside = sum(entry["inside"] for entry in judged)
         agree = sum(entry["agrees"] for entry in judged)
+        widths = [0.5 * (one["high"] - one["low"]) / abs(one["value"]) for one in judged if one["value"]]
         print_paragraph(
             f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction; {agree} agree "
             "with it by both intervals (± is half their own)"
         )
+        if widths:
+            print_paragraph(
+                f"half an interval is {100.0 * median(widths):.2g} % of what is predicted in the median, "
+                f"{100.0 * max(widths):.2g} % at most"
+            )
         if agree < MOST * len(judged):
             print_paragraph(LACKS)
     for found in one_sided(measured):
