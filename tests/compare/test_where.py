@@ -140,4 +140,4 @@ def test_a_window_that_is_asked_for_again_holds_all_its_instants() -> None:
     for one in where([looked_at(filtered, HULL, phases())])["worst"]:
         begin, end = (np.datetime64(one[key][:-1], "ns").astype(np.int64) for key in ("start", "end"))
         instants = odd.start_utc_ns + np.round(odd.time_s * 1e9).astype(np.int64)
-        assert np.count_nonzero((instants >= begin) & (instants <= end)) == 20
+        assert np.count_nonzero((instants >= begin) & (instants <= end)) == 24

@@ -244,6 +244,21 @@ def test_held_out_runs_change_no_fitted_bit(late: tuple[Sailed, Diagnosis]) -> N
     assert other.held_out_error != first.held_out_error
 
 
+def test_what_the_effects_bring_that_a_model_has_already_is_said_first(late: tuple[Sailed, Diagnosis]) -> None:
+    ship, found = late
+    none = DiagnosisSettings(most_steps=0)
+    again = ship.diagnosis(LAG, settings=none, given=[effects.get("rudder_lag")])
+    share = as_json(found)["share_explained"]
+    assert as_json(found)["share_explained_before"] is None
+    # as much as the step of it explains
+    assert as_json(again)["share_explained_before"] == pytest.approx(share, abs=0.02)
+    assert as_json(again)["share_explained"] is None
+    first = sentences(again)[0]
+    assert (
+        first.startswith("Already in the model: first-order rudder lag.") and f"explains {100 * share:.0f} %" in first
+    )
+
+
 def test_zigzags_to_one_side_alone_claim_no_asymmetry() -> None:
     """Twenty and fifteen degrees, both first to starboard: what is one side's and what is a bias is hardly seen."""
     ship = sailed("none")
