@@ -214,9 +214,10 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         inside = sum(entry["inside"] for entry in judged)
         agree = sum(entry["agrees"] for entry in judged)
         widths = [0.5 * (one["high"] - one["low"]) / abs(one["value"]) for one in judged if one["value"]]
+        by_both = f"; {agree} agree with it by both intervals (± is half their own)"
         print_paragraph(
-            f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction; {agree} agree "
-            "with it by both intervals (± is half their own)"
+            f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction"
+            + (by_both if any(entry["measured_low"] is not None for entry in judged) else "")
         )
         if widths:
             print_paragraph(
