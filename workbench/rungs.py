@@ -12,10 +12,13 @@ from math import isnan, nan
 from typing import Any
 
 from kempf.pipeline.predict.median_error import median_error
+from kempf.workbench.report.numbers import in_degrees
 from kempf.workbench.terminal import number
 
 #: percent of the motion from which a free run has left the measured course
 _LOST = 100.0
+#: what is said beside sizes of more than one step
+OF_ITS_STEP = "a size is that of its step's model; what the last model says of all"
 #: what is said beside free runs and sizes of `Rung.by_legs`
 BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
 
@@ -38,6 +41,11 @@ class Size:
     #: None where it is not known.
     std: float | None
     unit: str
+
+    @property
+    def words(self) -> str:
+        """As people read it, see `sized`."""
+        return sized(self.name, self.value, self.std, self.unit)
 
 
 @dataclass(frozen=True)
@@ -102,6 +110,18 @@ def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
     Of manoeuvres that came later there is none.
     """
     return {name: _percent(error) for name, error in (rung.get("free_run_fitted_to_legs") or {}).items()}
+
+
+def sized(name: str, value: float, std: float | None, unit: str) -> str:
+    """Return a parameter with its standard error, angles in degrees.
+
+    Examples
+    --------
+    >>> sized("c", 0.1, 0.01, "rad"), sized("c", 2.2, None, "1")
+    ('c 5.73 ± 0.57 deg', 'c 2.2 ± -')
+    """
+    shown, error, read_in = in_degrees(value, nan if std is None else std, unit)
+    return f"{name} {number(shown)} ± {number(error, 2)} {'' if read_in in ('', '1') else read_in}".rstrip()
 
 
 def in_words(error: float | None) -> str:

@@ -3,7 +3,8 @@
 The linear filter takes means of the readings over a grid and has its derivatives in closed form; the extended one takes
 the same means, carries effects, and its derivatives are differences of passes. The linear filter at the readings'
 own instants is there for comparison. How far apart are their hulls, and what does an evaluation with derivatives, and a
-fit, cost? That decides which filter a model without effects goes through.
+fit, cost? A single run without effects goes through the linear one, and pools, which are compared with models with
+effects, through the extended one (decision 0094).
 """
 
 from __future__ import annotations
@@ -191,7 +192,8 @@ def page(outcomes: list[tuple[Zigzag, Outcome, Outcome, Outcome]]) -> list[str]:
         f"evaluation with derivatives takes {slower[0]:.2f} times as long by the linear filter on means "
         f"and {slower[1]:.2f} times by the extended one; a fit on means {slower[2]:.2f} times. "
         f"The farthest of the six parameters is {middle[0]:.2f} standard errors away on means, and by the extended "
-        f"filter another {middle[1]:.3f}: a model without effects goes through the linear one, which costs least.",
+        f"filter another {middle[1]:.3f}: a single run goes through the linear one, which costs least; pools, which "
+        "are compared with models with effects, go through the extended one.",
         "",
         *result_page.table(head, rows),
         "",

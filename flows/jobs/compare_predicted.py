@@ -55,7 +55,8 @@ class Beside:
         if value is None or low is None or high is None:
             return None
         above = self.measured >= value
-        own = high - value if above else value - low
+        # of a figure that too few ships of a model reach the value may lie outside
+        own = max(high - value if above else value - low, 0.0)
         end = self.measured_low if above else self.measured_high
         return abs(self.measured - value) <= hypot(own, 0.0 if end is None else self.measured - end)
 

@@ -25,6 +25,7 @@ from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
+from kempf.pipeline.diagnose.sizes import as_read
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
@@ -325,12 +326,14 @@ def _of_nothing(ahead: Ahead | None, ship: ShipPart) -> tuple[str, ...]:
         own = np.flatnonzero(model.own(effect.name))
         pairs = [(p, values[k], std[k]) for p, k in zip(effect.parameters, own, strict=True) if not p.shapes]
         if pairs and all(abs(value) < _THERE * error for _, value, error in pairs):
-            sizes = ", ".join(
-                f"{effect.name}.{p.name} = {value:.2g} ± {error:.1g} {p.unit.removesuffix('1')}".rstrip()
-                for p, value, error in pairs
-            )
+            sizes = ", ".join(_as_read(f"{effect.name}.{p.name}", value, error, p.unit) for p, value, error in pairs)
             warnings.append(f"within {_THERE:g} standard errors of nothing, these data do not show it: {sizes}")
     return tuple(warnings)
+
+
+def _as_read(name: str, value: float, error: float, unit: str) -> str:
+    factor, shown = as_read(unit)
+    return f"{name} = {factor * value:.2g} ± {factor * error:.1g} {shown}".rstrip()
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:

@@ -187,10 +187,8 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             "n": len(known),
             "not_predicted": len(errors) - len(known),
         },
-        "free_run_error_percent": _in_percent(_mean([run.free_run_error for run in runs])),
-        "free_run_error_percent_fitted_to_legs": _in_percent({**_mean(legs), "median": _finite(median_error(legs))})
-        if legs
-        else None,
+        "free_run_error_percent": _errors([run.free_run_error for run in runs]),
+        "free_run_error_percent_fitted_to_legs": _errors(legs) if legs else None,
     }
 
 
@@ -218,6 +216,12 @@ def _error(runs: Sequence[ComparedRun]) -> float:
 
 def _finite(error: float) -> float | None:
     return error if np.isfinite(error) else None
+
+
+def _errors(errors: Sequence[float]) -> dict[str, float | None]:
+    """Return mean, standard error and median in percent, and how many runs leave the measured course altogether."""
+    summed = _in_percent({**_mean(errors), "median": _finite(median_error(errors)) if errors else None})
+    return {**summed, "off": sum(not error < 1.0 for error in errors)}
 
 
 def _in_percent(mean: dict[str, float | None]) -> dict[str, float | None]:

@@ -21,9 +21,7 @@ from kempf.schemas.enumeration import listed
 #: so many free runs that leave the course are named
 _NAMED = 3
 #: of what is left where nothing is seen in it
-_LIKE_NOISE = (
-    "; what is left looks like noise: neither a known effect nor a smooth force of unknown origin improves on it"
-)
+_REST = "; neither a known effect nor a smooth force of unknown origin improves on the rest"
 #: said of the free runs of such a ship
 _UNSTABLE = (
     " She does not keep a straight course by herself, so that the free run of any model leaves hers: what counts is "
@@ -88,6 +86,11 @@ def _given(diagnosis: Diagnosis) -> list[str]:
     assert plain is not None
     assert now is not None
     titles = [effect.title for effect in now.model.effects]
+    if share <= 0.0:
+        return [
+            f"Already in the model: {listed(titles)}. Of the plain model's misfit one leg ahead, in manoeuvres left "
+            "out, nothing is explained by that. What follows is about the whole of it."
+        ]
     return [
         f"Already in the model: {listed(titles)}. Of the plain model's misfit (mean square) one leg ahead, in "
         f"manoeuvres left out, {'this explains' if len(titles) == 1 else 'these explain'} {100.0 * share:.0f} %; the "
@@ -137,7 +140,8 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     ]
     share = share_explained(diagnosis)
     if share is not None:
-        rest = "" if diagnosis.something_left or last.disagrees is not None else _LIKE_NOISE
+        seen = diagnosis.something_left or last.disagrees is not None or diagnosis.immaterial or diagnosis.suspected
+        rest = "" if seen else _REST
         lines.append(
             f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained"
             f"{rest}."

@@ -19,7 +19,7 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
-from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, PooledFit, climbed, ended
+from kempf.pipeline.estimate.pooled_fit import SWIFTEST, CommonLikelihood, PooledFit, climbed, ended, swiftness
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.block_arrow import Arrow
 from kempf.pipeline.estimate.search.climb import Search
@@ -106,7 +106,7 @@ def fit_plain(
     Raises
     ------
     DataRejected
-        ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
+        ``no_ship_explains_it``: none of the runs can be identified by itself.
     """
     outcomes = []
     for outcome in workers.map(lambda run: fitted_alone(run, spec, settings), runs):
@@ -137,16 +137,38 @@ def fit_plain(
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
         layout, search = climbed_from(best)
-    # by the filter of the common fit: that of single runs differs from it by tenths of log-likelihood
-    points = [Point(single.hull, np.zeros(0), level) for single, level in zip(alone, own_levels, strict=True)]
-    separate = sum(passed.log_likelihood for passed in workers.map(sensitivity.passed, filtered, points))
+    separate = _separate(alone, filtered, own_levels, search.theta[:_HULL], workers)
     if not (search.converged and _agreement(alone, separate, search).p_value >= LEVEL):
         # runs that seem to be of two ships may have been climbed on a lower hill
         beside, other = climbed_from(mariner_like(runs[0].ship.length_m).array())
-        instead = other.converged or not np.isfinite(search.log_likelihood)
-        if instead and other.log_likelihood > search.log_likelihood + _HIGHER:
+        # the higher one may end at the limit of what a hull may be, not converged: the lower is no better for that
+        if other.log_likelihood > search.log_likelihood + _HIGHER:
             layout, search = beside, other
     return PlainFit(ended(layout, search), alone, left_out, _agreement(alone, separate, search))
+
+
+def _separate(
+    alone: Sequence[Alone], filtered: Sequence[RunFilter], levels: Float, common: Float, workers: Executor
+) -> float:
+    """Return the log-likelihood of all runs, each with a hull of its own, as the common fit counts it.
+
+    By its filter: that of single runs differs by tenths. And within its limit: a run by itself may have a hull that
+    answers faster than vessels do, and climbs anew then, from the common one.
+
+    Parameters
+    ----------
+    levels : ndarray, shape (runs, 6)
+        Logarithms of the single runs' noise levels.
+    common : ndarray, shape (6,)
+        The hull of all.
+    """
+    points = [Point(single.hull, np.zeros(0), level) for single, level in zip(alone, levels, strict=True)]
+    values = [passed.log_likelihood for passed in workers.map(sensitivity.passed, filtered, points)]
+    for number, (single, run) in enumerate(zip(alone, filtered, strict=True)):
+        if swiftness(single.hull, run.run.ship.length_m) > SWIFTEST:
+            begin = np.concatenate([common, levels[number]])
+            values[number] = climbed(CommonLikelihood([run], workers), begin).log_likelihood
+    return sum(values)
 
 
 def _agreement(alone: Sequence[Alone], separate: float, search: Search[Arrow]) -> Agreement:

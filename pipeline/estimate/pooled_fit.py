@@ -195,6 +195,8 @@ def fit(
     # a number that happens to lie near 0 may grow to the size that it has in other ships
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
+    if swiftness(begin, filtered[0].run.ship.length_m) > SWIFTEST:
+        begin = hull
     theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
     return ended(layout, climbed(layout, theta, max_iterations, wanted, listener))
 

@@ -33,6 +33,9 @@ _STEP_RAD = float(np.deg2rad(2.0))
 #: after the other to see how well. Fewer readings than that show nothing.
 _LOGGED_FROM_RAD, _PARTS, _FEWEST = 5.0 * pi / 3.0, 8, 20
 
+#: standard errors of a component from which a current is seen by the log alone
+_SEEN_BY_LOG = 2.5
+
 
 @dataclass(frozen=True)
 class CircleDrift:
@@ -48,6 +51,11 @@ class CircleDrift:
     def size_m_s(self) -> float:
         """Its size, m/s."""
         return hypot(self.north_m_s, self.east_m_s)
+
+    @property
+    def seen_by_log(self) -> bool:
+        """Whether a current that the water log shows by itself is one; by chance one is seen in 4 % of turns."""
+        return self.size_m_s > _SEEN_BY_LOG * self.std_m_s
 
     @property
     def seen(self) -> bool:
@@ -173,10 +181,14 @@ def current_by_log(track: TurnTrack, execute_s: float, course_rad: float) -> Cir
 
 
 def _by_log(track: TurnTrack, known: Mask) -> tuple[float, float]:
-    """Return the current towards north and east by which speeds over ground and through the water differ, m/s."""
+    """Return the current towards north and east by which speeds over ground and through the water differ, m/s.
+
+    The log is regressed on the speed over ground along the bow, which is the surer of the two: what the log's noise
+    takes from the coefficient of a regressor would look like a current, as the ship loses speed while she turns.
+    """
     heading, log = track.heading_rad[known], track.log_m_s[known]
-    difference = track.speed_m_s[known] * np.cos(track.drift_rad[known]) - log
-    # the constant and the speed itself are the water log's bias and scale
-    basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), log])
-    north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
-    return float(north), float(east)
+    along = track.speed_m_s[known] * np.cos(track.drift_rad[known])
+    # the log's scale and bias beside it
+    basis = np.column_stack([np.cos(heading), np.sin(heading), along, np.ones(heading.size)])
+    north, east, scale, _ = np.linalg.lstsq(basis, log, rcond=None)[0]
+    return -float(north / scale), -float(east / scale)

@@ -82,7 +82,8 @@ def circle_figures(
     -----
     The interval of what is measured from the execute holds the instant of the execute, the scatter of the approach's
     heading, the noise of the positions and the uncertainty of the stream, each by difference quotients. The interval of
-    what is steady is the scatter of four parts of the steady turn.
+    what is steady is the scatter of four parts of the steady turn, and what the uncertainty of a current does that the
+    water log shows of less than whole turns.
     """
     reasons: list[str] = []
     source = track.source
@@ -96,7 +97,10 @@ def circle_figures(
     by_passages = drift is not None
     if drift is None and source != "heading alone" and not through_water:
         drift = current_by_log(track, begin, course)
-    agreed = drift is not None and drift.seen and (not by_passages or is_current(drift, track, begin))
+    if by_passages:
+        agreed = drift is not None and drift.seen and is_current(drift, track, begin)
+    else:
+        agreed = drift is not None and drift.seen_by_log
     freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
     corrected = freed if agreed else track
     over_ground, less_drift, corrected_figures = (
@@ -111,7 +115,7 @@ def circle_figures(
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
     spread = _steady_spread(corrected, begin, course, corrected_figures)
-    uncertain = 0.0 if drift is None or (drift.seen and not agreed) else drift.std_m_s
+    uncertain = 0.0 if drift is None or (by_passages and drift.seen and not agreed) else drift.std_m_s
     nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
     figures: dict[str, Figure] = {}
     values = asdict(corrected_figures)
@@ -120,7 +124,10 @@ def circle_figures(
     short = "the heading changed by less than a whole turn"
     for name in _STEADY:
         missing = "not recorded" if abs(corrected_figures.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
-        figures[name] = Figure.of(values[name], spread[name], missing)
+        # over whole turns a current averages out of what is steady, over less it does not
+        by_current = [] if by_passages or not uncertain else nudged[-2:]
+        halves = [(getattr(high, name) - getattr(low, name)) / 2.0 for low, high in by_current]
+        figures[name] = Figure.of(values[name], float(np.hypot(spread[name], np.linalg.norm(halves))), missing)
     if not np.isfinite(course_std_rad):
         figures["speed_loss_percent"] = Figure.of(nan, nan, "the approach was not steady or is not recorded")
     if source == "positions":
@@ -146,7 +153,7 @@ def _said_of(drift: CircleDrift, *, agreed: bool, by_passages: bool) -> str:
         return f"The water log shows a current of {size}: it is taken off."
     if agreed:
         return f"The circle drifts by {size}, and so does the water, as the water log shows: it is taken off."
-    if drift.seen:
+    if by_passages and drift.seen:
         return f"The circle drifts by {size}; no water log shows a current: the figures are over ground."
     what = "The circle drifts by" if by_passages else "By the water log the current is"
     return f"{what} less than {2.0 * drift.std_m_s:.2g} m/s: the figures are over ground."

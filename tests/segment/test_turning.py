@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.circle_drift import current_by_log
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.spiral import Spiral
+from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, direct_spiral
@@ -90,6 +93,39 @@ def test_of_one_turn_the_water_log_shows_the_current(hull: str, rudder: float, t
     without = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
     assert not without.measured.corrected
     assert without.measured.drift is None
+
+
+def test_noise_of_the_log_is_no_current() -> None:
+    """She loses three eighths of her speed in the turn, and her log is good to 0.2 m/s."""
+    execute_s, rate, lasted_s = 60.0, np.deg2rad(1.5), 60.0 + 365.0 / 1.5
+    time_s = np.arange(0.0, lasted_s, 1.0)
+    since = np.maximum(time_s - execute_s, 0.0)
+    ahead, across = 8.0 - 3.0 * (1.0 - np.exp(-since / 40.0)), -1.5 * (1.0 - np.exp(-since / 20.0))
+    heading = rate * since
+    north = ahead * np.cos(heading) - across * np.sin(heading) + 0.3
+    east = ahead * np.sin(heading) + across * np.cos(heading) - 0.2
+    path = TurnTrack(
+        time_s=time_s,
+        north_m=np.cumsum(north),
+        east_m=np.cumsum(east),
+        heading_rad=heading,
+        speed_m_s=np.hypot(north, east),
+        drift_rad=heading - np.unwrap(np.arctan2(east, north)),
+        log_m_s=ahead,
+        source="positions",
+        distance_std_m=1.0,
+        bridged_share=0.0,
+    )
+    off, std = [], []
+    for seed in range(40):
+        noise = np.random.default_rng(seed).normal(0.0, 0.2, time_s.size)
+        found = current_by_log(replace(path, log_m_s=1.02 * ahead - 0.1 + noise), execute_s, 0.0)
+        assert found is not None
+        off.append((found.north_m_s - 0.3, found.east_m_s + 0.2))
+        std.append(found.std_m_s)
+    assert np.max(np.abs(np.mean(off, axis=0))) < 0.02
+    assert np.max(np.std(off, axis=0)) < 1.5 * np.mean(std) < 0.1
+    assert current_by_log(replace(path, log_m_s=np.full(time_s.size, np.nan)), execute_s, 0.0) is None
 
 
 def test_without_a_log_the_drift_is_said_and_left_in() -> None:

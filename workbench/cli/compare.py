@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from itertools import zip_longest
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -126,7 +126,8 @@ def _print_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
     """Say which manoeuvres are left out, those of one reason together."""
     by_reason: dict[str, list[str]] = {}
     for name, why in skipped.items():
-        by_reason.setdefault(why, []).append(name)
+        # a reason that begins with the manoeuvre's name is said after it
+        by_reason.setdefault(why.removeprefix(f"{name} "), []).append(name)
     for why, names in by_reason.items():
         shown = names if verbose else names[:MOST]
         more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
@@ -191,14 +192,11 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
         click.echo(f"  inside the 95 % interval: {', '.join(shares)}")
     likelihood, legs = mean["free_run_error_percent"], mean["free_run_error_percent_fitted_to_legs"]
     if not legs:
-        click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(likelihood)} %")
+        click.echo(f"  free-run error (100 - fit %, mean over channels): {_error(likelihood)}")
         return
-    by_likelihood = f"{_with_error(likelihood)} % with the likelihood's parameters"
-    middle = "diverges" if legs["median"] is None else f"{legs['median']:.2f} %"
-    by_legs = f"median {middle}" if off else f"{_with_error(legs)} %, median {middle}"
     click.echo(
-        f"  free-run error (100 - fit %, mean over channels): {by_likelihood}, {by_legs}, with those fitted to legs "
-        "(--horizon legs), which predictions of manoeuvres take"
+        f"  free-run error (100 - fit %, mean over channels): {_error(likelihood)} with the likelihood's parameters, "
+        f"{_error(legs, middle=True)} with those fitted to legs (--horizon legs), which predictions of manoeuvres take"
     )
 
 
@@ -206,7 +204,7 @@ def _fits_together(runs: list[dict[str, Any]], mean: dict[str, Any], there: list
     """Return the fit over all runs, the mean; the median where runs have run off, so many."""
     if off:
         known = {name: [run["fit_percent"][name] for run in runs if name in run["fit_percent"]] for name in there}
-        middle = {name: median(-inf if fit is None else fit for fit in fits) for name, fits in known.items()}
+        middle = {name: median(fits) for name, fits in known.items()}
         parts = [f"{_CHANNELS[name]} {_percent(fit)} %" for name, fit in middle.items()]
         return f"median fit: {', '.join(parts)}; {off} of {len(runs)} run off, so that a mean says nothing"
     fits = [mean[name] for name in there]
@@ -278,6 +276,14 @@ def _off(fit: float | None) -> bool:
 
 def _percent(value: float | None) -> str:
     return "-" if value is None else "ran off" if _off(value) else f"{value:.2f}"
+
+
+def _error(errors: dict[str, Any], *, middle: bool = False) -> str:
+    """Return a free-run error over manoeuvres: the mean, where none of them has left the course; the median."""
+    median_of = "diverges" if errors["median"] is None else f"{errors['median']:.2f} %"
+    if errors["off"]:
+        return f"median {median_of}, {errors['off']} left the course"
+    return f"{_with_error(errors)} %" + (f", median {median_of}," if middle else "")
 
 
 def _signed(value: float | None) -> str:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import nan
 from typing import Any
 
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.report.numbers import in_degrees
-from kempf.workbench.rungs import Rung, Size, compared, in_words, remarks
+from kempf.workbench.rungs import OF_ITS_STEP, Rung, compared, in_words, remarks
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
 #: columns of the error one leg ahead, and of that of free runs
@@ -49,7 +47,7 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
             [
                 str(rung["step"]),
                 rung["added"] or "plain model",
-                ", ".join(map(_size, errors.sizes)) or "-",
+                ", ".join(size.words for size in errors.sizes) or "-",
                 *percents(errors),
                 number(wind, 2),
                 ids[rung["parameter_set_id"]],
@@ -59,7 +57,7 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     print_table(head, rows, f"{vessel}: error, % of the motion")
     print_by_legs(beside)
     if len([rung for rung in beside if rung.sizes]) > 1:
-        click.echo("  a size is that of its step's model; what the last model says of all: kempf params show")
+        click.echo(f"  {OF_ITS_STEP}: kempf params show")
 
 
 def percents(errors: Rung) -> list[str]:
@@ -72,8 +70,3 @@ def print_by_legs(rungs: Sequence[Rung]) -> None:
     """Say where the figures of rungs are with the parameters fitted to legs."""
     for remark in remarks(rungs):
         click.echo(f"  {remark}")
-
-
-def _size(size: Size) -> str:
-    value, std, unit = in_degrees(size.value, nan if size.std is None else size.std, size.unit)
-    return f"{size.name} {number(value)} ± {number(std, 2)}{'' if unit in ('', '1') else f' {unit}'}"

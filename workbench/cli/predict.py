@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from statistics import median
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -188,7 +187,7 @@ def _print_models(predicted: Predicted) -> None:
 
 def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     from kempf.flows.jobs.one_sided import one_sided
-    from kempf.workbench.documents.prediction import LACKS, MOST, sentence_of
+    from kempf.workbench.documents.prediction import judged, sentence_of
 
     if not measured:
         print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
@@ -208,24 +207,8 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
     print_table(
         head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
     )
-    shown = [beside.show() for run in measured for beside in run.figures]
-    judged = [entry for entry in shown if entry["inside"] is not None]
-    if judged:
-        inside = sum(entry["inside"] for entry in judged)
-        agree = sum(entry["agrees"] for entry in judged)
-        widths = [0.5 * (one["high"] - one["low"]) / abs(one["value"]) for one in judged if one["value"]]
-        by_both = f"; {agree} agree with it by both intervals (± is half their own)"
-        print_paragraph(
-            f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction"
-            + (by_both if any(entry["measured_low"] is not None for entry in judged) else "")
-        )
-        if widths:
-            print_paragraph(
-                f"half an interval is {100.0 * median(widths):.2g} % of what is predicted in the median, "
-                f"{100.0 * max(widths):.2g} % at most"
-            )
-        if agree < MOST * len(judged):
-            print_paragraph(LACKS)
+    for sentence in judged(measured):
+        print_paragraph(sentence)
     for found in one_sided(measured):
         print_paragraph(sentence_of(found))
     for run in measured:

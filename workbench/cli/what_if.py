@@ -40,7 +40,7 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
         [
             number(t.value),
             number(t.in_std, 2),
-            "-" if isnan(t.log_likelihood_falls_by) else f"{-t.log_likelihood_falls_by:+.3g}",
+            "-" if isnan(t.log_likelihood_falls_by) else f"{0.0 - t.log_likelihood_falls_by:+.3g}",
             number(t.free_run_error_percent, 3),
         ]
         for t in answer.tried

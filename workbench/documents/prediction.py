@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import Any
 
 from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
@@ -16,6 +17,32 @@ LACKS = (
     "intervals of predictions hold the errors of the parameters and the models that fit alike; what all of these "
     "models lack is in none"
 )
+
+
+def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
+    """Say how many measured figures lie in the intervals of their predictions, and how wide these are."""
+    figures = [figure for manoeuvre in measured for figure in manoeuvre.figures if figure.inside is not None]
+    if not figures:
+        return []
+    inside, agree = sum(figure.inside is True for figure in figures), sum(figure.agrees is True for figure in figures)
+    first = f"{inside} of {len(figures)} measured figures lie inside the interval of their prediction"
+    if any(figure.measured_low is not None for figure in figures):
+        first += f"; {agree} agree with it by both intervals"
+    predicted = [figure.predicted for figure in figures]
+    widths = [
+        0.5 * (one.high - one.low) / abs(one.value)
+        for one in predicted
+        if one.value and one.low is not None and one.high is not None
+    ]
+    sentences = [first]
+    if widths:
+        sentences.append(
+            f"half an interval is {100.0 * median(widths):.2g} % of what is predicted in the median, "
+            f"{100.0 * max(widths):.2g} % at most"
+        )
+    if agree < MOST * len(figures):
+        sentences.append(LACKS)
+    return sentences
 
 
 def sentence_of(found: OneSided) -> str:
@@ -45,6 +72,7 @@ def prediction_document(
     if measured is not None:
         document |= {
             "measured": [manoeuvre.show() for manoeuvre in measured],
+            "judged": judged(measured),
             "one_sided": [{**vars(found), "sentence": sentence_of(found)} for found in one_sided(measured)],
             "other_orders": dict(others),
         }

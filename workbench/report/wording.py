@@ -120,7 +120,7 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequenc
 def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
     """Return what the effects bring that the model has already, the beginning of a sentence."""
     share = content.get("share_explained_before")
-    if share is None:
+    if share is None or share <= 0.0:
         return f"Even with {listed(has)} in the model"
     explained = f"{100.0 * share:.0f} % of the plain model's misfit one leg ahead"
     return f"With {listed(has)} the model explains {explained}; beside it"

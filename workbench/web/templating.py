@@ -9,7 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kempf.workbench.documents.tried import refits
-from kempf.workbench.rungs import in_words
+from kempf.workbench.rungs import in_words, sized
 from kempf.workbench.terminal import number
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.pages.corrections import as_asked, undoing
@@ -39,6 +39,7 @@ def _templates() -> Environment:
         "minute": lambda iso: iso[:16].replace("T", " "),
         "words": words,
         "error": in_words,
+        "sized": sized,
         "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
         "vessel_address": of_vessel,
         "as_asked": as_asked,
