@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import degrees
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,6 @@ from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
-from kempf.pipeline.diagnose.sizes import as_read
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
@@ -332,8 +332,10 @@ def _of_nothing(ahead: Ahead | None, ship: ShipPart) -> tuple[str, ...]:
 
 
 def _as_read(name: str, value: float, error: float, unit: str) -> str:
-    factor, shown = as_read(unit)
-    return f"{name} = {factor * value:.2g} ± {factor * error:.1g} {shown}".rstrip()
+    """Return a parameter as people read it; not by the diagnosis, whose code counts in no set's fingerprint."""
+    if unit in ("rad", "rad/s"):
+        value, error, unit = degrees(value), degrees(error), unit.replace("rad", "deg")
+    return f"{name} = {value:.2g} ± {error:.1g} {'' if unit == '1' else unit}".rstrip()
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:
