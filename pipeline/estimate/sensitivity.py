@@ -25,6 +25,8 @@ N_HULL, N_LEVELS = 6, 6
 _HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
 #: part of a variance that a level's step adds to it
 _ADDED = float(np.expm1(2.0 * _LEVEL_STEP))
+#: logarithm by which a level may lie below what is next to nothing: none that is bounded lies lower
+_DEEPEST = 100.0
 #: of that of an effect, the least step of lasting noise
 _LEAST_STEP = 1e-2
 
@@ -102,7 +104,8 @@ def _steps(filtered: RunFilter, point: Point) -> tuple[Float, Float]:
     # the variance with the step, beside the one without it
     least = next_to_nothing(filtered.spec)
     small = least > point.levels
-    more = 1.0 + _ADDED * np.exp(2.0 * np.maximum(least - point.levels, 0.0))
+    # a level that these data do not have may be the logarithm of nothing at all
+    more = 1.0 + _ADDED * np.exp(2.0 * np.clip(least - point.levels, 0.0, _DEEPEST))
     by = np.where(small, 0.5 * np.log(more), _LEVEL_STEP)
     divisor = np.where(small, 0.5 * (more - 1.0), _LEVEL_STEP)
     return np.concatenate([hull, np.array(effects), by]), np.concatenate([hull, np.array(effects), divisor])
