@@ -192,8 +192,8 @@ def page(outcomes: list[tuple[Zigzag, Outcome, Outcome, Outcome]]) -> list[str]:
         f"evaluation with derivatives takes {slower[0]:.2f} times as long by the linear filter on means "
         f"and {slower[1]:.2f} times by the extended one; a fit on means {slower[2]:.2f} times. "
         f"The farthest of the six parameters is {middle[0]:.2f} standard errors away on means, and by the extended "
-        f"filter another {middle[1]:.3f}: a single run goes through the linear one, which costs least; pools, which "
-        "are compared with models with effects, go through the extended one.",
+        f"filter another {middle[1]:.3f}. Pools, which are compared with models with effects, go through the extended "
+        "one; a single run through the linear one, which also takes readings at their own instants.",
         "",
         *result_page.table(head, rows),
         "",
