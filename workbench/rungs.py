@@ -17,8 +17,6 @@ from kempf.workbench.terminal import number
 
 #: percent of the motion from which a free run has left the measured course
 _LOST = 100.0
-#: what is said beside sizes of more than one step
-OF_ITS_STEP = "a size is that of its step's model; what the last model says of all"
 #: what is said beside free runs and sizes of `Rung.by_legs`
 BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
 

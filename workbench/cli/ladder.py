@@ -9,7 +9,7 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.rungs import OF_ITS_STEP, Rung, compared, in_words, remarks
+from kempf.workbench.rungs import Rung, compared, in_words, remarks
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
 #: columns of the error one leg ahead, and of that of free runs
@@ -57,7 +57,7 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     print_table(head, rows, f"{vessel}: error, % of the motion")
     print_by_legs(beside)
     if len([rung for rung in beside if rung.sizes]) > 1:
-        click.echo(f"  {OF_ITS_STEP}: kempf params show")
+        click.echo("  a size is that of its step's model; what the last model says of all: kempf params show")
 
 
 def percents(errors: Rung) -> list[str]:

@@ -12,8 +12,8 @@ from kempf.flows.jobs.predicted import Predicted
 from kempf.workbench.manoeuvre_figures import in_words
 
 #: said where fewer than this share of measured figures agree with what is predicted
-MOST = 0.75
-LACKS = (
+_MOST = 0.75
+_LACKS = (
     "intervals of predictions hold the errors of the parameters and the models that fit alike; what all of these "
     "models lack is in none"
 )
@@ -40,8 +40,8 @@ def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
             f"half an interval is {100.0 * median(widths):.2g} % of what is predicted in the median, "
             f"{100.0 * max(widths):.2g} % at most"
         )
-    if agree < MOST * len(figures):
-        sentences.append(LACKS)
+    if agree < _MOST * len(figures):
+        sentences.append(_LACKS)
     return sentences
 
 

@@ -22,9 +22,10 @@ def document(desk: Desk, set_id: str) -> dict[str, Any]:
 def gather(desk: Desk, set_id: str) -> Page:
     """Return the page of a parameter set."""
     parameter_set = named_set(desk.warehouse, set_id, None)
+    unseen = parameter_set.unseen
     content = {
         "one": parameter_set.show(),
-        "fitted": [name for name in parameter_set.segment_ids if name not in parameter_set.unseen],
+        "fitted": [name for name in parameter_set.segment_ids if name not in unseen],
         "held_out": list(parameter_set.convergence.get("held_out") or ()),
         "by_legs": by_name(parameter_set),
         "groups": (
