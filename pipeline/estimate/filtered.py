@@ -182,7 +182,7 @@ class RunFilter:
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, run.speed_error_rate_per_s),
         )
-        rudders = self.model.rudders(run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, values)
+        rudders = self.model.rudders(run.rudder_line, values)
         rows = n if states else 0
         kept = (
             *(np.full((n, 3, k), np.nan), np.full((n, 3, k), np.nan)),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
 from kempf.pipeline.model.effects import RUDDER_COURSES
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.pipeline.model.terms.expression import compiled
 from kempf.pipeline.model.terms.program import CONSTANT, VARIABLE
 from kempf.schemas.effect import Effect, Parameter
@@ -191,7 +192,7 @@ class EffectModel:
         Parameters
         ----------
         time_s, rudder_rad : ndarray, shape (n,)
-            Evenly spaced.
+            Increasing instants, the rudder linear in between.
         values : ndarray, shape (p,)
             Parameters.
         """
@@ -200,27 +201,21 @@ class EffectModel:
                 rudder_rad = RUDDER_COURSES[effect.rudder_course](time_s, rudder_rad, own)
         return rudder_rad
 
-    def rudders(self, time_s: Float, rudder_rad: Float, before: Float, between: Float, values: Float) -> Float:
+    def rudders(self, line: RudderLine, values: Float) -> Float:
         """Return the rudder as the effects have it for several sets of their parameters, shape (n, k).
 
         Parameters
         ----------
-        time_s, rudder_rad : ndarray, shape (n,)
-            Evenly spaced.
-        before : ndarray, shape (m,)
-            The rudder at as many instants before the first.
-        between : ndarray, shape (n,)
-            What is added to every course, see `kempf.pipeline.estimate.record.grid_run.GridRun.rudder_between`.
+        line : RudderLine
+            Its reading.
         values : ndarray, shape (p, k)
             Parameters.
         """
         if all(effect.rudder_course is None for effect in self.effects):
-            return np.repeat(rudder_rad[:, None] + between[:, None], values.shape[1], axis=1)
+            return np.repeat(line.as_read[:, None], values.shape[1], axis=1)
         own, of = np.unique(values, axis=1, return_inverse=True)
-        step, known = time_s[1] - time_s[0], np.concatenate([before, rudder_rad])
-        time = time_s[0] + step * (np.arange(known.size) - before.size)
-        courses = [self.rudder(time, known, column)[before.size :] for column in own.T]
-        return np.ascontiguousarray((np.stack(courses, axis=-1) + between[:, None])[:, of])
+        courses = [line.laid(self.rudder(line.time_s, line.angle_rad, column)) for column in own.T]
+        return np.ascontiguousarray(np.stack(courses, axis=-1)[:, of])
 
 
 def _moving(targets: Sequence[int], codes: Sequence[NDArray[np.int64]], width: int) -> list[list[int]]:

@@ -14,6 +14,7 @@ from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.ship import Ship, Track
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
@@ -74,8 +75,7 @@ def planned(track: Track, ship: Ship, like: GridRun, spec: ModelSpec) -> GridRun
         like,
         name="planned",
         inputs=inputs,
-        rudder_between=np.zeros(fine.size),
-        rudder_before=np.zeros(0),
+        rudder_line=RudderLine.through(lead + time, track.column(motion.RUDDER), fine),
         rudder_noise=np.full(n, float(np.median(like.rudder_noise))),
         measured=np.where(np.isfinite(like.measured[again]), 0.0, np.nan),
         offset_s=like.offset_s[again],

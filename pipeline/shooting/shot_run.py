@@ -14,6 +14,7 @@ from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.shooting.kernel import shoot
+from kempf.pipeline.shooting.led import lead
 from kempf.pipeline.shooting.windows import Windows
 from kempf.schemas.model_spec import ModelSpec
 
@@ -85,9 +86,7 @@ class ShotRun:
             What would be measured, window after window.
         """
         run, k = self.windows.run, shared.shape[1]
-        rudder = self.model.rudders(
-            run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
-        )
+        rudder = self.model.rudders(run.rudder_line, shared[N_HULL:])
         groups = [np.minimum(np.arange(first, first + MOST), k - 1) for first in range(0, k, MOST)]
         parts = [self._shot(shared[:, at], own[:, at], starts[..., at], rudder[:, at]) for at in groups]
         return np.concatenate(parts, axis=-1)[..., :k]
@@ -99,6 +98,8 @@ class ShotRun:
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
         constants = run.constants(self.spec.rudder_speed_exponent)
+        if extra:
+            x0[:, N_BEFORE : N_BEFORE + extra] = self._led(shared, own, rudder, constants)[self.windows.begins]
         predicted = np.empty((self.windows.rows.size, 3, MOST))
         shoot(
             *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
@@ -107,6 +108,17 @@ class ShotRun:
             *(self.model.table, predicted, LANES),
         )
         return predicted
+
+    def _led(self, shared: Float, own: Float, rudder: Float, constants: Float) -> Float:
+        """Return the states of the effects at all instants of the run, shape (n, k, lanes)."""
+        run = self.windows.run
+        states = np.empty((run.measured.shape[0], self.model.extra, MOST))
+        lead(
+            *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
+            *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.current_row, constants),
+            *(self.windows.course, np.ascontiguousarray(own), self.model.table, states, LANES),
+        )
+        return states
 
     def steps(self, at: Unknowns, scale: Float) -> Float:
         """Return the steps of the differences: shared, constants that there are, states; shape (6 + p + d + 3,)."""

@@ -43,6 +43,15 @@ class Windows:
         return np.repeat(np.arange(self.begins.size), self.ends - self.begins + 1)
 
     @cached_property
+    def course(self) -> Float:
+        """What was measured at every instant of the run, means over `_SMOOTHED` of a window, shape (n, 3); 0 if never.
+
+        For what moves slowly beside it: the states of effects.
+        """
+        reach = max(2, round(_SMOOTHED * int(np.max(self.ends - self.begins))))
+        return np.column_stack([_mean_about(column, reach) for column in self.run.measured.T])
+
+    @cached_property
     def measured(self) -> Float:
         """What was measured at every row, shape (m, 3)."""
         return self.run.measured[self.rows]
@@ -78,6 +87,20 @@ def noise_of(column: Float) -> float:
     third = third[np.isfinite(third)]
     # median of the absolute value of a Gaussian is 0.6745 of its standard deviation; 20 = 1 + 9 + 9 + 1
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20.0)) if third.size > 3 else float("nan")
+
+
+def _mean_about(column: Float, reach: int) -> Float:
+    """Return the means of what there is within some instants to either side, shape (n,), linear over what is empty."""
+    n, there = column.size, np.isfinite(column)
+    if not there.any():
+        return np.zeros(n)
+    at = np.arange(n)
+    first, last = np.maximum(at - reach, 0), np.minimum(at + reach + 1, n)
+    count, total = (np.concatenate([[0.0], np.cumsum(c)]) for c in (there, np.where(there, column, 0.0)))
+    many = count[last] - count[first]
+    full = many > 0.0
+    mean: Float = np.interp(at, at[full], (total[last] - total[first])[full] / many[full])
+    return mean
 
 
 def _smoothed(run: GridRun, begins: Rows, reach: int) -> tuple[Float, Float]:

@@ -8,7 +8,6 @@ import numpy as np
 
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import RunFilter
-from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.estimate.sensitivity import Point
@@ -49,13 +48,10 @@ def sailed_by_model(
 
     ``late_s``: by how much the rudder reaches the hull later than it is logged.
     """
-    inputs = run.inputs.copy()
-    shift = round(late_s / (run.step_s / ROWS))
-    if shift:
-        inputs[:, 1] = np.concatenate([np.full(shift, inputs[0, 1]), inputs[:-shift, 1]])
-    n = run.measured.shape[0]
+    line, n = run.rudder_line, run.measured.shape[0]
+    late = replace(line, angle_rad=np.interp(line.time_s - late_s, line.time_s, line.angle_rad))
     exact = replace(run, rudder_noise=np.zeros(n), offset_s=np.zeros((n, 3)), measured=np.zeros((n, 3)))
-    clean = RunFilter(replace(exact, inputs=inputs), EffectModel(), QUIET).free(hull, np.zeros(0), np.zeros(8))
+    clean = RunFilter(replace(exact, rudder_line=late), EffectModel(), QUIET).free(hull, np.zeros(0), np.zeros(8))
     noise = scale * NOISE * np.random.default_rng(seed).standard_normal((n, 3))
     return RunFilter(replace(exact, measured=clean + noise), EffectModel(), QUIET)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,16 +13,12 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, fit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get
-from tests.estimate.test_plain_fit import SPEC, fitted, run
+from tests.estimate.test_plain_fit import SPEC, fitted, run, with_rudder
 
 
 def with_neutral_angle(*offset_rad: float) -> PooledFit:
     """Fit hull and neutral angle to runs whose logs show a rudder that stands off by so much."""
-    runs = []
-    for seed, offset in zip((21, 22, 23), offset_rad, strict=True):
-        inputs = run(seed).inputs.copy()
-        inputs[:, 1] -= offset
-        runs.append(replace(run(seed), inputs=inputs))
+    runs = [with_rudder(run(seed), 1.0, -offset) for seed, offset in zip((21, 22, 23), offset_rad, strict=True)]
     plain = fitted(*runs).fit
     model = EffectModel((get("neutral_angle"),))
     with ThreadPoolExecutor(2) as workers:

@@ -132,9 +132,11 @@ def test_a_run_knows_what_the_rudder_did_before_it() -> None:
     run = make_run("run", record, instruments_of(trial), spec, ship, step_s=2.0)
     step = run.fine_time_s[1]
     start_s = (record.start_utc_ns - trial.settings.start_utc_ns) * 1e-9
-    back = start_s - step * np.arange(run.rudder_before.size, 0, -1)
+    line, before = run.rudder_line, run.rudder_line.time_s < 0.0
+    back = start_s + line.time_s[before]
     # the log begins with the first reading of the rudder
-    assert 0.0 < back[0] < 2.0 and run.rudder_before.size < run.inputs.shape[0]
+    assert 0.0 < back[0] < 2.0 and np.count_nonzero(before) < run.inputs.shape[0]
+    np.testing.assert_allclose(np.diff(back), step)
     true = trial.truth.trajectory.at(back).rudder
-    assert np.std(run.rudder_before - true) < 0.5 * np.deg2rad(0.3)
-    assert plain_run("run", record, spec, 0.0, 100.0).rudder_before.size == 0
+    assert np.std(line.angle_rad[before] - true) < 0.5 * np.deg2rad(0.3)
+    assert plain_run("run", record, spec, 0.0, 100.0).rudder_line.time_s[0] == 0.0

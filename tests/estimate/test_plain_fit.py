@@ -180,12 +180,17 @@ def test_a_pool_of_short_zigzags_converges(hull: str, first: int) -> None:
     assert pool.fit.converged and pool.fit.iterations <= 12
 
 
+def with_rudder(run: GridRun, factor: float, offset_rad: float = 0.0) -> GridRun:
+    """A run of a log that shows another rudder."""
+    inputs = run.inputs.copy()
+    inputs[:, 1] = factor * inputs[:, 1] + offset_rad
+    line = replace(run.rudder_line, angle_rad=factor * run.rudder_line.angle_rad + offset_rad)
+    return replace(run, inputs=inputs, rudder_line=line)
+
+
 def test_two_ships_are_no_pool() -> None:
-    other = run(23)
-    inputs = other.inputs.copy()
     # a rudder that does a tenth less: b1 and b2 of this ship are smaller
-    inputs[:, 1] /= 0.9
-    found = fitted(run(21), run(22), replace(other, name="changed", inputs=inputs))
+    found = fitted(run(21), run(22), replace(with_rudder(run(23), 1.0 / 0.9), name="changed"))
     assert found.agreement.p_value < 1e-6 and found.agreement.widened > 1.5
     off = {one.run.name: float(np.abs(off_in_std(one, found.fit)).max()) for one in found.alone}
     assert max(off, key=lambda name: off[name]) == "changed"

@@ -14,7 +14,7 @@ from kempf.pipeline.estimate.posterior import Posterior, from_json, posterior_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.updated import Updated, updated
 from kempf.pipeline.model.effect_model import EffectModel
-from tests.estimate.test_plain_fit import SPEC, fitted, run
+from tests.estimate.test_plain_fit import SPEC, fitted, run, with_rudder
 
 
 def left_by(*runs: GridRun) -> Posterior:
@@ -91,13 +91,12 @@ def test_a_new_run_is_judged_where_it_is_stated(before: Posterior) -> None:
 
 
 def test_a_run_of_another_ship_is_not_brought_in(before: Posterior) -> None:
-    inputs = run(25).inputs.copy()
-    inputs[:, 1] /= 0.8
-    assert brought(before, replace(run(25), inputs=inputs)) is None
+    other = with_rudder(run(25), 1.0 / 0.8)
+    assert brought(before, other) is None
     # not even where the runs before disagree somewhat: then it must be odd among them, too
     apart = replace(before, agreement=replace(before.agreement, statistic=80.0))
     assert apart.agreement.widened > 1.5
-    assert brought(apart, replace(run(25), inputs=inputs)) is None
+    assert brought(apart, other) is None
 
 
 def test_a_run_that_cannot_be_identified_by_itself_is_not_brought_in(before: Posterior) -> None:

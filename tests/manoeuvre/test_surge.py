@@ -10,6 +10,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, plain_run
 from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.manoeuvre.covered import beyond, covered
 from kempf.pipeline.manoeuvre.rudder_rate import SOLAS_RAD_S, rudder_rate
 from kempf.pipeline.manoeuvre.sailed import Reach
@@ -56,7 +57,8 @@ def losing(run: GridRun, tau: float, losses: Float, settled: float = 8.4, begin:
     inputs = run.inputs.copy()
     inputs[:, 0] = np.interp(run.fine_time_s, run.time_s, speed)
     inputs[:, 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")] = 2.0
-    changed = {"approach_m_s": begin, "approach_per_s": 2.0 * begin / settled}
+    readings = SpeedReadings(run.time_s, np.array(speed))
+    changed = {"approach_m_s": begin, "approach_per_s": 2.0 * begin / settled, "speed_readings": readings}
     return replace(run, inputs=inputs, channels=run.channels | {"shaft_speed"}, **changed)  # type: ignore[arg-type]
 
 
@@ -136,7 +138,8 @@ def test_without_turns_the_loss_is_a_guess_and_said_to_be() -> None:
     measured[:, 1] = 0.0
     inputs = run.inputs.copy()
     inputs[:, 0] = 7.7
-    fit = surge_of([replace(run, measured=measured, inputs=inputs)], LENGTH)
+    steady = SpeedReadings(run.time_s, np.full(run.time_s.size, 7.7))
+    fit = surge_of([replace(run, measured=measured, inputs=inputs, speed_readings=steady)], LENGTH)
     assert fit.std[2] > 1.0
     assert "usual ships" in fit.remarks[0]
     none = surge_of([replace(run, measured=np.full_like(measured, np.nan))], LENGTH)

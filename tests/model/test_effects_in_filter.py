@@ -10,8 +10,10 @@ import pytest
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.model.dynamics import N_INPUT
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.effects import catalogue
@@ -45,8 +47,8 @@ def run() -> GridRun:
         start_utc_ns=0,
         step_s=step,
         inputs=inputs,
-        rudder_between=np.zeros(fine.size),
-        rudder_before=np.zeros(0),
+        rudder_line=RudderLine.through(fine, inputs[:, 1], fine),
+        speed_readings=SpeedReadings(fine[::ROWS], inputs[::ROWS, 0]),
         rudder_noise=np.zeros(n),
         speed_error_std_m_s=0.0,
         speed_error_rate_per_s=0.0,

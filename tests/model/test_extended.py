@@ -13,9 +13,11 @@ from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.filters.linear_kernel import N_STATE, likelihood, no_trace
 from kempf.pipeline.estimate.likelihood import INITIAL_STD
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.model.discretise import LONGEST
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN, E
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas.effect import Effect, ExtraState, Parameter
 from kempf.schemas.errors import UsageError
@@ -46,8 +48,8 @@ def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> GridRun:
         start_utc_ns=0,
         step_s=step,
         inputs=inputs,
-        rudder_between=np.zeros(fine.size),
-        rudder_before=np.zeros(0),
+        rudder_line=RudderLine.through(fine, inputs[:, 1], fine),
+        speed_readings=SpeedReadings(fine[::ROWS], inputs[::ROWS, 0]),
         rudder_noise=np.full(n, 2e-3),
         speed_error_std_m_s=0.1,
         speed_error_rate_per_s=0.2,
@@ -116,7 +118,8 @@ def test_a_step_of_the_covariance_is_as_good_as_two_halves():
     inputs[: whole.inputs.shape[0] * 2 - 1] = _doubled(whole.inputs)
     heading = _doubled(whole.heading_rad[:, None])[:, 0]
     row = np.column_stack([-np.sin(heading), np.cos(heading)])
-    halves = replace(halves, inputs=inputs, current_row=np.vstack([row, row[-1:]]))
+    line = RudderLine.through(halves.fine_time_s, inputs[:, 1], halves.fine_time_s)
+    halves = replace(halves, inputs=inputs, rudder_line=line, current_row=np.vstack([row, row[-1:]]))
     assert passed(halves) == pytest.approx(passed(whole), abs=5e-3)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.effect import Effect
 from kempf.schemas.effects import catalogue
 
@@ -110,9 +111,30 @@ def test_what_the_rudder_did_before_a_run_decides_where_it_stands(effect: Effect
     model, size = EffectModel((effect,)), one(effect, 1)
     cut = 350
     values = np.stack([np.zeros(size.size), size], axis=1)
-    between = np.zeros(time.size - cut)
-    found = model.rudders(time[: time.size - cut], rudder[cut:], rudder[:cut], between, values)
-    np.testing.assert_array_equal(found[:, 0], rudder[cut:])
-    np.testing.assert_allclose(found[:, 1], course(time, rudder, size)[cut:], atol=1e-12)
-    alone = model.rudders(time[: time.size - cut], rudder[cut:], np.zeros(0), between, values)
+    grid = time[cut:] if (time.size - cut) % 2 else time[cut:-1]
+    found = model.rudders(RudderLine.through(time, rudder, grid), values)
+    np.testing.assert_allclose(found[::2, 0], rudder[cut::2][: grid[::2].size], atol=1e-12)
+    np.testing.assert_allclose(found[::2, 1], course(time, rudder, size)[cut::2][: grid[::2].size], atol=1e-12)
+    alone = model.rudders(RudderLine.through(time[cut:], rudder[cut:], grid), values)
     assert np.max(np.abs(alone[:, 1] - found[:, 1])) > 1e-3
+
+
+@courses
+def test_an_effect_acts_on_the_corners_of_the_reading_not_on_those_of_the_grid(effect: Effect, course: Course) -> None:
+    """Its course on a coarse grid is that of a fine one, its area over two steps with it."""
+    fine = np.arange(0.0, 400.0, 0.01)
+    size, fast = one(effect, 1), np.deg2rad(5.0)
+    # executes between the instants of the grid, and a rudder that goes over within a step of it
+    corners = np.array([0.0, 21.37, 21.37 + 0.35 / fast, 83.11, 83.11 + 0.7 / fast, 160.73, 160.73 + 0.7 / fast, 400.0])
+    reading = np.array([0.0, 0.0, 0.35, 0.35, -0.35, -0.35, 0.35, 0.35])
+    grid = np.arange(0.0, 399.0, 1.0)
+    line = RudderLine.through(corners, reading, grid)
+    exact = course(fine, np.interp(fine, corners, reading), size)
+    laid = EffectModel((effect,)).rudders(line, size[:, None])[:, 0]
+    np.testing.assert_allclose(laid[::2], np.interp(grid[::2], fine, exact), atol=2e-3)
+    areas = (laid[:-1:2] + 4.0 * laid[1::2] + laid[2::2]) / 3.0
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * 0.01 * (exact[1:] + exact[:-1]))])
+    expected = np.diff(np.interp(grid[::2], fine, whole))
+    # on the whole it comes neither early nor late
+    assert abs(np.sum((areas - expected) * np.sign(expected))) < 2e-3 * np.sum(np.abs(expected))
+    np.testing.assert_allclose(areas, expected, atol=2e-2)

@@ -64,6 +64,35 @@ def test_a_window_runs_as_the_extended_filter_does_without_measurements() -> Non
     assert np.all(apart < 1e-3 * np.std(other, axis=0))
 
 
+@pytest.mark.parametrize("name", ["memory", "speed_loss"])
+def test_what_an_effect_remembers_is_there_when_a_window_begins(name: str) -> None:
+    """Windows begun anywhere go on as the whole manoeuvre does; begun with nothing remembered they would not."""
+    ship = sailed("cross_flow_drag")
+    model, hull = EffectModel((effects.get(name),)), mariner_like(ship.runs[0].ship.length_m).array()
+    values = np.array([0.8] if name == "memory" else [1.0, 0.2])
+    own = np.array([2e-3, 1e-6, 0.1, -0.2, 1e-4])
+    n = ship.runs[0].measured.shape[0]
+    run = replace(ship.runs[0], measured=np.zeros((n, 3)), offset_s=np.zeros((n, 3)))
+    free = RunFilter(run, model, ship.spec).free(hull, values, np.concatenate([np.zeros(3), own]))
+    run = replace(run, measured=free)
+    windows = windows_of(run, 100.0)
+    assert windows.begins.size > 5
+    current = run.current_row @ own[2:4]
+    starts = (free - np.column_stack([current, np.full(current.size, own[4]), np.zeros(current.size)]))[windows.begins]
+    shared = np.concatenate([hull, values])[:, None]
+    found = ShotRun(windows, model, ship.spec).predicted(shared, own[:, None], starts[..., None])[..., 0]
+    apart = np.sqrt(np.mean((found - free[windows.rows]) ** 2, axis=0)) / np.std(free, axis=0)
+    assert np.all(apart < 8e-3)
+
+    class Forgetful(ShotRun):
+        def _led(self, *given: np.ndarray) -> np.ndarray:
+            return np.zeros_like(super()._led(*given))
+
+    without = Forgetful(windows, model, ship.spec).predicted(shared, own[:, None], starts[..., None])[..., 0]
+    forgotten = np.sqrt(np.mean((without - free[windows.rows]) ** 2, axis=0)) / np.std(free, axis=0)
+    assert forgotten.max() > 5.0 * apart.max()
+
+
 def test_windows_are_a_leg_long_and_overlap_by_half(dragged: tuple[Sailed, ShootingRange, Ahead]) -> None:
     ship, shooting, _ = dragged
     windows = shooting.fitted[0]

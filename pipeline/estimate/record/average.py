@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.moves import moves
 from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 
 #: the grid's step in times that the ship needs for her length, and in legs of the zigzag; its bounds, s
 _STEP_LENGTHS, _STEP_LEGS, _FINEST_S, _COARSEST_S = 0.06, 1.0 / 60.0, 0.05, 1.0
@@ -94,3 +95,16 @@ def cell_means(time_s: Float, column: Float, step_s: float, n: int) -> tuple[Flo
         curvature[reach : n - reach] = np.convolve(mean, _CURVATURE, mode="valid") / step_s**2
     # where a mean is missing beside it, a cell's curvature is not known
     return mean - 0.5 * np.nan_to_num(curvature) * apart, np.nan_to_num(late)
+
+
+def readings_averaged(readings: SpeedReadings, step_s: float, n: int) -> SpeedReadings:
+    """Return the means of readings around the instants of the grid, each at the mean instant of its readings.
+
+    Parameters
+    ----------
+    n : int
+        Instants of the grid.
+    """
+    mean, late = cell_means(readings.time_s, readings.speed_m_s, step_s, n)
+    there = np.isfinite(mean)
+    return SpeedReadings((step_s * np.arange(n) + late)[there], mean[there], readings.mean_s)

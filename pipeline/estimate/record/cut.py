@@ -8,6 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.corners import with_corners
 from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.gear_runs import with_straight_runs
 from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
@@ -20,6 +21,7 @@ from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre,
 from kempf.pipeline.estimate.record.jumps import find_jumps
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.speed_error import SpeedError, rudder_of_speed_error
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.estimate.record.water_speed import water_speed
 from kempf.schemas.errors import DataRejected
 
@@ -74,13 +76,15 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     warnings += remarks
     check_course(lateral)
     lateral = _without_jumps(lateral, warnings)
-    moved = with_corners(without_noise(rudder, rudder_std), rudder_std)
+    moved = with_corners(with_straight_runs(without_noise(rudder, rudder_std), rudder_std), rudder_std)
     timed = [lateral.time_utc_ns, heading.time_utc_ns, moved.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    log = _cut_log(on_time, as_delivered, start_utc_ns, end_utc_ns)
-    speed, error_std, error_time_s = _speed(*log, lateral, heading, rudder, instants, warnings)
+    log, mean_s = _cut_log(on_time, as_delivered, start_utc_ns, end_utc_ns)
+    log = _without_spikes(log, lateral, warnings)
+    slow = water_speed(log, heading, rudder, mean_s)
+    speed = _speed(slow.series, instants)
     instants, speed = _trimmed(instants, speed, warnings)
     delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -98,7 +102,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         rudder_period_s=rudder.period_s,
         rudder_noise_rad_sqrt_s=np.full(instants.size, rudder_std * float(np.sqrt(rudder.period_s))),
-        speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), error_std, error_time_s),
+        speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), slow.error_std, slow.error_time_s),
+        speed_readings=_readings(log, mean_s, instants),
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
@@ -171,19 +176,8 @@ def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) ->
     return part
 
 
-def _speed(
-    log: Series | None,
-    mean_s: float,
-    lateral: LateralSpeed,
-    heading: Series,
-    rudder: Series,
-    instants: Nanoseconds,
-    warnings: list[str],
-) -> tuple[Float, float, float]:
-    """Speed through the water at the instants, standard deviation of its error, m/s, and the error's time, s.
-
-    The log, else the forward part of the GNSS velocity.
-    """
+def _without_spikes(log: Series | None, lateral: LateralSpeed, warnings: list[str]) -> Series:
+    """Return the speed log, else the forward part of the GNSS velocity."""
     if log is None:
         good = np.isfinite(lateral.forward_m_s)
         log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])
@@ -191,15 +185,25 @@ def _speed(
     log, spikes = without_spikes(log)
     if spikes:
         warnings.append(f"{spikes} spikes of the speed left out")
-    slow = water_speed(log, heading, rudder, mean_s)
-    speed = slow.series.at(instants, LONGEST_SPEED_GAP_S)
+    return log
+
+
+def _readings(log: Series, mean_s: float, instants: Nanoseconds) -> SpeedReadings:
+    """Return what the log read from the first of the instants to the last."""
+    own = log.between(int(instants[0]), int(instants[-1]))
+    return SpeedReadings(own.seconds_since(int(instants[0])), own.value, mean_s)
+
+
+def _speed(slow: Series, instants: Nanoseconds) -> Float:
+    """Return the speed through the water at the instants, NaN in its gaps."""
+    speed = slow.at(instants, LONGEST_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(
             "no_speed",
             "The ship does not move through the water in this segment: the model of eq. (16) needs V > 0.",
             "Check the speed channel and its unit, or choose a segment under way.",
         )
-    return speed, slow.error_std, slow.error_time_s
+    return speed
 
 
 def _cut_log(on_time: Punctual, as_delivered: Instruments, start_ns: int, end_ns: int) -> tuple[Series | None, float]:

@@ -14,12 +14,14 @@ from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.average import cell_means, instants_of, step_of
+from kempf.pipeline.estimate.record.average import cell_means, instants_of, readings_averaged, step_of
 from kempf.pipeline.estimate.record.conditions import conditions
 from kempf.pipeline.estimate.record.record import Instants, Record
 from kempf.pipeline.estimate.record.rudder_inflow import approach_speed
 from kempf.pipeline.estimate.record.speed_error import SpeedError
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
+from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
@@ -50,13 +52,9 @@ class GridRun:
     step_s: float
     #: Shape (ROWS (n - 1) + 1, N_INPUT). See `kempf.pipeline.estimate.filters.ekf.extended`.
     inputs: Float
-    #: Shape (ROWS (n - 1) + 1,). What to add to the rudder at the instants of the input table, so that Simpson's rule
-    #: over half a step, by which the extended filter goes, gives its very integral: it turns corners between them. 0 at
-    #: the ends of half steps.
-    rudder_between: Float
-    #: Shape (m,). The rudder at the instants of the input table before its first one, as far back as the log goes
-    #: and no longer than the run: where a play in the gear stands, what came before decides.
-    rudder_before: Float
+    #: The rudder with its corners, laid on the instants of the input table. It begins before them, as far back as the
+    #: log goes and no longer than the run: where a play in the gear stands, what came before decides.
+    rudder_line: RudderLine
     #: Shape (n,).
     rudder_noise: Float
     #: speed_error_std_m_s, speed_error_rate_per_s: Of the error of the speed, a first-order process; 0 where there is
@@ -81,6 +79,8 @@ class GridRun:
     ship: ShipConstants
     #: Number of the log among the vessel's.
     day: int
+    #: Averaged around the instants.
+    speed_readings: SpeedReadings
     #: See `kempf.pipeline.estimate.record.record.Record`.
     instant_errors: InstantErrors = IN_THE_LOG
     #: Shape (n,). Of the means of the lateral speed, see `kempf.pipeline.estimate.record.record.Record`.
@@ -173,9 +173,8 @@ class GridRun:
             return course
 
         # straight lines from quarter to quarter of a step, with the same integral as Simpson's rule
-        rudder, error = self.inputs[:, 1].copy(), self.speed_error
-        middle = rudder[1::2] + self.rudder_between[1::2]
-        rudder[1::2] = (8.0 * middle - rudder[:-1:2] - rudder[2::2]) / 6.0
+        rudder, error = self.rudder_line.as_read.copy(), self.speed_error
+        rudder[1::2] = (8.0 * rudder[1::2] - rudder[:-1:2] - rudder[2::2]) / 6.0
         return Instants(
             time_s=time,
             speed_m_s=laid(fine, self.inputs[:, 0]),
@@ -292,8 +291,7 @@ def make_run(
         start_utc_ns=record.start_utc_ns,
         step_s=step_s,
         inputs=inputs,
-        rudder_between=_between(record, fine, inputs[:, 1]),
-        rudder_before=_before(instruments.get("rudder_angle"), record.start_utc_ns, fine),
+        rudder_line=_line(instruments.get("rudder_angle"), record, fine),
         rudder_noise=np.interp(
             time, record.time_s, record.shake_rad_sqrt_s if brief else record.rudder_noise_rad_sqrt_s
         ),
@@ -309,34 +307,24 @@ def make_run(
         channels=have,
         ship=ship,
         day=day,
+        speed_readings=readings_averaged(record.speed_readings, step_s, n),
         load=load,
         instant_errors=record.instant_errors,
         lateral_by_late=None if by_late is None else cell_means(record.time_s, by_late, step_s, n)[0],
     )
 
 
-def _between(record: Record, fine: Float, rudder: Float) -> Float:
-    """Return `GridRun.rudder_between`, from the course of the rudder in straight lines between a record's instants."""
-    time, course = record.time_s, record.rudder_rad
-    whole = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (course[1:] + course[:-1]))])
-    at = np.clip(np.searchsorted(time, fine, side="right") - 1, 0, time.size - 1)
-    integral = whole[at] + 0.5 * (fine - time[at]) * (rudder + course[at])
-    result = np.zeros(fine.size)
-    mean = np.diff(integral[::2]) / np.diff(fine[::2])
-    result[1::2] = (6.0 * mean - rudder[:-1:2] - rudder[2::2]) / 4.0 - rudder[1::2]
-    return result
-
-
-def _before(rudder: Series | None, start_ns: int, fine: Float) -> Float:
-    """Return `GridRun.rudder_before`."""
+def _line(rudder: Series | None, record: Record, fine: Float) -> RudderLine:
+    """Return `GridRun.rudder_line`: before a record as the rudder was read, of which there may be nothing."""
     if rudder is None:
-        return np.zeros(0)
-    back = np.round(fine[:0:-1] * SECOND_NS).astype(np.int64)
+        return RudderLine.through(record.time_s, record.rudder_rad, fine)
+    start_ns, back = record.start_utc_ns, np.round(fine[:0:-1] * SECOND_NS).astype(np.int64)
     earlier = rudder.between(start_ns - int(back[0]), start_ns + round(gap_limit_s(rudder) * SECOND_NS))
     course = without_noise(earlier, noise_std(earlier)).at(start_ns - back, gap_limit_s(rudder))
     unknown = np.flatnonzero(np.isnan(course))
-    known: Float = course[unknown[-1] + 1 :] if unknown.size else course
-    return known
+    known = slice(int(unknown[-1]) + 1 if unknown.size else 0, None)
+    time = np.concatenate([-fine[:0:-1][known], record.time_s])
+    return RudderLine.through(time, np.concatenate([course[known], record.rudder_rad]), fine)
 
 
 def current_row(spec: ModelSpec, heading: Float) -> Float:

@@ -10,6 +10,7 @@ from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.lateral_speed import LateralSpeed
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.speed_error import SpeedError
+from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 
 #: columns of `Record.measured`
 MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
@@ -61,6 +62,8 @@ class Record(Instants):
 
     #: UTC of ``time_s`` = 0.
     start_utc_ns: int
+    #: What ``speed_m_s`` was smoothed from.
+    speed_readings: SpeedReadings
     #: Median time between readings of the rudder; in between its course is a guess, a straight line.
     rudder_period_s: float
     #: Eq. (18) with its standard errors.

@@ -28,12 +28,23 @@ def _channel(run: GridRun, name: str) -> Float:
     return values
 
 
+#: with fewer readings a log shows no speed in turns
+_FEWEST = 8
+
+
 @dataclass(frozen=True, eq=False)
 class LoggedSpeed:
-    """One run: time step, speed, what the shaft does, and what costs speed, all over the speed that the shaft keeps."""
+    """One run: readings of the speed, what the shaft does, and what costs speed, all over the speed the shaft keeps."""
 
+    #: Of the run's instants, lengths at the speed that the shaft keeps.
     step: float
+    #: Shape (m,). As it was read: smoothed, its errors would go by what it was smoothed with.
     speed: Float
+    #: Shape (m,). When each was read, in steps from the first instant.
+    at: Float
+    #: How many steps each is a mean over, about that; 0 where it is of an instant.
+    over: float
+    #: Shape (n,). At the run's instants.
     shaft: Float
     #: Shape (n, 4). By kind of loss; NaN where it is not known.
     costs: Float
@@ -48,6 +59,10 @@ class LoggedSpeed:
         rate = _yaw_rate(run, length_m)
         if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
             return None
+        at, over = run.speed_readings.time_s / run.step_s, run.speed_readings.mean_s / run.step_s
+        inside = (at >= 0.5 * over) & (at <= speed.size - 1 - 0.5 * over)
+        if np.count_nonzero(inside) < _FEWEST:
+            return None
         shaft = np.ones(speed.size)
         if run.shaft_per_s is not None:
             shaft = _channel(run, "shaft_speed") / run.shaft_per_s
@@ -57,10 +72,11 @@ class LoggedSpeed:
         costs = np.column_stack([drift, (unit * rate) ** 2, rudder, _head_wind(run) / settled**2])
         gathers_way = abs(speed[0] / settled - 1.0) > UNSETTLED
         std = UNSETTLED_STD if gathers_way else SETTLED_STD
-        return cls(run.step_s * settled / length_m, speed / settled, shaft, costs, settled, std)
+        read = run.speed_readings.speed_m_s[inside] / settled
+        return cls(run.step_s * settled / length_m, read, at[inside], over, shaft, costs, settled, std)
 
     def columns(self, tau: float, reference_m_s: float | None = None) -> tuple[Float, Float]:
-        """Return the columns of V_0, of the first speed and of all losses, each through the lag of tau.
+        """Return the columns of V_0, of the first speed and of the losses, through the lag of tau, at the readings.
 
         It is in lengths at the speed of this log, or of ``reference_m_s``.
         """
@@ -72,9 +88,26 @@ class LoggedSpeed:
             response: Float = np.concatenate([[0.0], filtered([1.0 - decay], [1.0, -decay], mean)])
             return response
 
-        own = np.column_stack([lagged(self.shaft), decay ** np.arange(self.speed.size)])
+        own = np.column_stack([lagged(self.shaft), decay ** np.arange(self.shaft.size)])
         lost = np.column_stack([-lagged(self.costs[:, j]) for j in KINDS])
-        return own, lost
+        return self._read(own), self._read(lost)
+
+    def _read(self, course: Float) -> Float:
+        """Return what readings show of courses at the run's instants, shape (m, k) of (n, k)."""
+        if not self.over > 0.0:
+            return _between(course, self.at)
+        way = np.vstack([np.zeros(course.shape[1]), np.cumsum(0.5 * (course[1:] + course[:-1]), axis=0)])
+        half = 0.5 * self.over
+        mean: Float = (_between(way, self.at + half) - _between(way, self.at - half)) / self.over
+        return mean
+
+
+def _between(course: Float, at: Float) -> Float:
+    """Interpolate courses, shape (n, k), at some steps, shape (m,)."""
+    first = np.minimum(at.astype(np.int64), len(course) - 2)
+    share = (at - first)[:, None]
+    between: Float = course[first] * (1.0 - share) + course[first + 1] * share
+    return between
 
 
 def _yaw_rate(run: GridRun, length_m: float) -> Float | None:

@@ -1,6 +1,6 @@
 """What effects do to the rudder's course before it reaches the hull: the part of the catalogue that no formula can say.
 
-A file has one effect, and maps times in s (evenly spaced, at least two), the rudder in rad (linear between them) and
+A file has one effect, and maps times in s (increasing, at least two), the rudder in rad (linear between them) and
 the size of the effect to the rudder in rad that the hull feels, shape (n,) as both.
 """
 

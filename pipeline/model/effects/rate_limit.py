@@ -18,16 +18,17 @@ def rudder_course(time_s: Float, rudder_rad: Float, slowness: float) -> Float:
 
     ``slowness``: time for one radian, s/rad.
     """
-    chased: Float = _chased(np.ascontiguousarray(rudder_rad), float(time_s[1] - time_s[0]) / slowness)
+    chased: Float = _chased(np.ascontiguousarray(rudder_rad), np.diff(time_s) / slowness)
     return chased
 
 
 @njit(cache=True, nogil=True)
-def _chased(rudder, most):  # type: ignore[no-untyped-def]
-    """Follow with at most ``most`` a step; a step is one unit of time here, and a rate is an angle a step."""
+def _chased(rudder, mosts):  # type: ignore[no-untyped-def]
+    """Follow with at most so much a step; a step is one unit of time here, and a rate is an angle a step."""
     out = np.empty_like(rudder)
     out[0] = rudder[0]
     for k in range(1, rudder.size):
+        most = mosts[k - 1]
         rate, gap, place, left = rudder[k] - rudder[k - 1], rudder[k - 1] - out[k - 1], out[k - 1], 1.0
         if gap != 0.0:
             side = np.sign(gap)

@@ -17,16 +17,16 @@ def rudder_course(time_s: Float, rudder_rad: Float, tau: float) -> Float:
 
     ``tau``: time constant, s.
     """
-    followed: Float = _followed(np.ascontiguousarray(rudder_rad), float(time_s[1] - time_s[0]) / tau)
+    followed: Float = _followed(np.ascontiguousarray(rudder_rad), np.diff(time_s) / tau)
     return followed
 
 
 @njit(cache=True, nogil=True)
-def _followed(rudder, ratio):  # type: ignore[no-untyped-def]
+def _followed(rudder, ratios):  # type: ignore[no-untyped-def]
     out = np.empty_like(rudder)
     out[0] = rudder[0]
-    left = np.exp(-ratio)
     for k in range(1, rudder.size):
+        ratio = ratios[k - 1]
         behind = (rudder[k] - rudder[k - 1]) / ratio
-        out[k] = rudder[k] - behind + (out[k - 1] - rudder[k - 1] + behind) * left
+        out[k] = rudder[k] - behind + (out[k - 1] - rudder[k - 1] + behind) * np.exp(-ratio)
     return out
