@@ -158,10 +158,10 @@ def _widened(
     fitted = [run for run in basis.runs.runs if run.name in levels]
     filters = [RunFilter(left_out(run, gross.get(run.name, {})), model, basis.runs.spec) for run in fitted]
     own = [np.exp(np.array(levels[run.name], dtype=np.float64)) for run in fitted]
-    # a covariance that is wider already by what the runs disagree about is counted twice in it
+    # what the runs disagree about has widened the covariance already, and legs of runs that disagree show it again
     pooling: dict[str, Any] = dict(parameter_set.convergence.get("pooling") or {})
     already = float(parameter_set.convergence.get("widened") or pooling.get("widened") or 1.0)
-    return max(widening(filters, own, hull, values, covariance) / already**2, 1.0) if filters else 1.0
+    return max(widening(filters, own, hull, values, covariance) / already, 1.0) if filters else 1.0
 
 
 def _scale_m(parameter_set: ParameterSet) -> float:

@@ -2,10 +2,14 @@
 
 The covariance of maximum likelihood takes the prediction errors for independent. Where the model lacks something they
 remember: over a leg they pull the parameters one way. The scores of the legs show how much, whatever the reason: if the
-model were right, the sum of their squares would be the information. The factor is the root of the mean over the
-parameters of the one over the other (Huber 1967, "The behavior of maximum likelihood estimates under nonstandard
-conditions", Proc. 5th Berkeley Symposium; by clusters: Liang & Zeger 1986, "Longitudinal data analysis using
-generalized linear models", Biometrika 73).
+errors were independent, the sum of their squares would be that of the scores of the single instants. The factor is the
+root of the mean over the parameters of the one over the other (Huber 1967, "The behavior of maximum likelihood
+estimates under nonstandard conditions", Proc. 5th Berkeley Symposium; by clusters: Liang & Zeger 1986, "Longitudinal
+data analysis using generalized linear models", Biometrika 73; information by squares of scores: Berndt, Hall, Hall &
+Hausman 1974, "Estimation and inference in nonlinear structural models", Annals of Economic and Social Measurement 3).
+
+Of a log whose instants are not quite known every leg pulls the same way, and as far as they are known that is in the
+covariance already (`kempf.pipeline.diagnose.unsure_instants`): of such a log only the scatter of its legs counts.
 """
 
 from __future__ import annotations
@@ -39,24 +43,31 @@ def widening(
     hull, values : ndarray, shape (6,) and (p,)
         Estimates.
     covariance : ndarray, shape (6 + p, 6 + p)
-        Of them.
+        Of them, for the steps of the difference quotients alone.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     free = np.flatnonzero(std > 0.0)
     if free.size == 0:
         return 1.0
-    legs = np.concatenate(
-        [_scores(*pair, hull, values, _STEP * std, free) for pair in zip(filters, levels, strict=True)]
-    )
-    if len(legs) < _FEWEST:
+    slopes = [_slopes(*pair, hull, values, _STEP * std, free) for pair in zip(filters, levels, strict=True)]
+    parts = [_by_legs(one.run.rudder_rad, own) for one, own in zip(filters, slopes, strict=True)]
+    count = sum(map(len, parts))
+    of_log = np.repeat([one.run.day for one in filters], list(map(len, parts)))
+    unsure = {one.run.day for one in filters if not one.run.instant_errors.known}
+    legs, means = np.concatenate(parts), 0 if unsure else 1
+    for day in sorted(unsure):
+        legs[of_log == day] -= legs[of_log == day].mean(axis=0)
+        means += 1
+    if count - means < _FEWEST - 1:
         return 1.0
-    meat = legs.T @ legs * len(legs) / (len(legs) - 1.0)
-    mean = float(np.trace(meat @ covariance[np.ix_(free, free)])) / free.size
+    meat = legs.T @ legs * count / (count - means)
+    independent = sum(own.T @ own for own in slopes)
+    mean = float(np.trace(np.linalg.pinv(independent, hermitian=True) @ meat)) / free.size
     return float(np.sqrt(max(mean, 1.0))) if np.isfinite(mean) else 1.0
 
 
-def _scores(run_filter: RunFilter, levels: Float, hull: Float, values: Float, steps: Float, free: np.ndarray) -> Float:
-    """Return the derivative of every leg's log-likelihood by the free parameters, shape (legs, free)."""
+def _slopes(run_filter: RunFilter, levels: Float, hull: Float, values: Float, steps: Float, free: np.ndarray) -> Float:
+    """Return what every instant adds to the scores of the free parameters, a tenth of an error each, (n, free)."""
     theta = np.concatenate([hull, values])
     moved = np.repeat(theta[:, None], 2 * free.size, axis=1)
     for k, parameter in enumerate(free):
@@ -64,8 +75,14 @@ def _scores(run_filter: RunFilter, levels: Float, hull: Float, values: Float, st
         moved[parameter, 2 * k + 1] -= steps[parameter]
     passes = run_filter.run_filters(moved[:6], np.repeat(levels[:, None], 2 * free.size, axis=1), moved[6:])
     at = np.column_stack([_log_likelihoods(passed) for passed in passes])
-    slopes = (at[:, 0::2] - at[:, 1::2]) / (2.0 * steps[free])
-    leg = _legs(run_filter.run.rudder_rad)
+    # in units of the steps: the matrices are well scaled, and the factor is the same in any
+    slopes: Float = 0.5 * (at[:, 0::2] - at[:, 1::2])
+    return slopes
+
+
+def _by_legs(rudder_rad: Float, slopes: Float) -> Float:
+    """Return the scores of every leg, shape (legs, free)."""
+    leg = _legs(rudder_rad)
     scores: Float = np.stack([slopes[leg == k].sum(axis=0) for k in range(int(leg[-1]) + 1)])
     return scores
 
