@@ -44,10 +44,12 @@ def with_instrument_noise(fit: PooledFit, workers: Executor, listener: Listener 
         Notified of every iteration.
     """
     some = _some_of(fit)
-    noisy = _one_by_one(some, workers, listener)
-    if noisy is some:
+    noisy, stuck = _one_by_one(some, workers, listener)
+    if noisy is some and not stuck:
         return fit
     noisy = with_joint_noise(noisy, _LEAST_GAIN, workers, listener)
+    if noisy is some:
+        return fit
     return noisy if some is fit else _of_all(fit, some, noisy, workers, listener)
 
 
@@ -78,7 +80,12 @@ def _of_all(fit: PooledFit, some: PooledFit, noisy: PooledFit, workers: Executor
     return refit if refit.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
 
 
-def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
+def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> tuple[PooledFit, bool]:
+    """Return a fit with the noises that gain one after the other, and whether one that says most gained nothing.
+
+    A hull that has bent to all of them at once may be the top of a hill of its own, from which no climb with one of
+    them leads up.
+    """
     effects = catalogue()
     while True:
         there = {effect.name for effect in fit.model.effects}
@@ -87,10 +94,10 @@ def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> Pooled
             screen(fit, left, workers, listener), key=lambda candidate: np.nan_to_num(candidate.score), default=None
         )
         if best is None or not best.score > _LEAST_SCORE:
-            return fit
+            return fit, False
         if any(candidate.score > best.score for candidate in screen(fit, effects, workers, listener)):
-            return fit
+            return fit, False
         refit = added(fit, best, workers, listener=listener)
         if not refit.log_likelihood > fit.log_likelihood + _LEAST_GAIN:
-            return fit
+            return fit, True
         fit = refit

@@ -109,8 +109,8 @@ def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
     plain = fit_plain([ship.runs[i] for i in chosen], ship.spec, WORKERS)
     bent = plain.fit
     assert not is_ship(bent)
-    # of two tops the higher, though it lies where hulls end; and runs by themselves may have no quicker hulls
-    assert not bent.converged and bent.log_likelihood > 9500.0
+    # some top of several, none of which is a ship; runs by themselves may have no quicker hulls
+    assert bent.log_likelihood > 9300.0
     assert plain.agreement.statistic < 10.0
     found = added(bent, score(bent, effects.get("rudder_lag"), WORKERS), WORKERS)
     assert is_ship(found)

@@ -62,10 +62,13 @@ def test_it_is_fitted_with_them(identified: tuple[Path, Ran]) -> None:
     *alone, pooled = ran.json
     assert [len(one["segments"]) for one in (*alone, pooled)] == [1, 1, 2]
     truth = HULLS["ferry"].parameters
+    # two say more than one, before what they disagree about widens the errors
+    widened = pooled["convergence"]["pooling"]["widened"]
+    assert 1.0 <= widened < 1.5
     for name in HULL:
         one = pooled["parameters"][name]
         assert abs(one["value"] - getattr(truth, name)) < 4.0 * one["std"], name
-        assert one["std"] < min(each["parameters"][name]["std"] for each in alone), name
+        assert one["std"] < widened * min(each["parameters"][name]["std"] for each in alone), name
 
 
 def test_it_is_compared_and_shown_as_they_are(identified: tuple[Path, Ran], tmp_path: Path) -> None:
