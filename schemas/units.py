@@ -73,3 +73,16 @@ def factor_to_si(unit: str, si_unit: str, where: str) -> float:
             {"unit": unit, "expected": si_unit},
         )
     return factor
+
+
+def as_read(unit: str) -> tuple[float, str]:
+    """Return the factor to the unit that people read an angle in, and that; of what has no dimension the unit is empty.
+
+    Examples
+    --------
+    >>> as_read("m/s"), as_read("1")
+    ((1.0, 'm/s'), (1.0, ''))
+    """
+    if unit in ("rad", "rad/s"):
+        return 180.0 / pi, unit.replace("rad", "deg")
+    return 1.0, "" if unit == "1" else unit

@@ -161,7 +161,8 @@ def _widened(
     # what the runs disagree about has widened the covariance already, and legs of runs that disagree show it again
     pooling: dict[str, Any] = dict(parameter_set.convergence.get("pooling") or {})
     already = float(parameter_set.convergence.get("widened") or pooling.get("widened") or 1.0)
-    return max(widening(filters, own, hull, values, covariance) / already, 1.0) if filters else 1.0
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return max(widening(filters, own, hull, values, std) / already, 1.0) if filters else 1.0
 
 
 def _scale_m(parameter_set: ParameterSet) -> float:

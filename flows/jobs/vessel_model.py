@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import degrees
 from typing import Any
 
 import numpy as np
@@ -43,6 +42,7 @@ from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
+from kempf.schemas.units import as_read
 from kempf.warehouse import parameter_sets, provenance, vessels
 from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
 from kempf.warehouse.parameter_set import StoredValue as Stored
@@ -332,10 +332,8 @@ def _of_nothing(ahead: Ahead | None, ship: ShipPart) -> tuple[str, ...]:
 
 
 def _as_read(name: str, value: float, error: float, unit: str) -> str:
-    """Return a parameter as people read it; not by the diagnosis, whose code counts in no set's fingerprint."""
-    if unit in ("rad", "rad/s"):
-        value, error, unit = degrees(value), degrees(error), unit.replace("rad", "deg")
-    return f"{name} = {value:.2g} ± {error:.1g} {'' if unit == '1' else unit}".rstrip()
+    factor, shown = as_read(unit)
+    return f"{name} = {factor * value:.2g} ± {factor * error:.1g} {shown}".rstrip()
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:

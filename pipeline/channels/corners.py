@@ -72,10 +72,8 @@ def with_corners(rudder: Series, noise_std: float) -> Series:
     since = (rudder.value[k + 1] - rudder.value[k] - right * span[k]) / (left - right)
     inside = (since > _NEAR * span[k]) & (since < (1.0 - _NEAR) * span[k])
     k, left, since = k[inside], left[inside], since[inside]
-    time = np.concatenate([rudder.time_utc_ns, rudder.time_utc_ns[k] + np.round(since * SECOND_NS).astype(np.int64)])
-    value = np.concatenate([rudder.value, rudder.value[k] + left * since])
-    order = np.argsort(time, kind="stable")
-    return Series(time[order], value[order])
+    instants = rudder.time_utc_ns[k] + np.round(since * SECOND_NS).astype(np.int64)
+    return rudder.with_points(instants, rudder.value[k] + left * since)
 
 
 def _rate(slope: Float, span: Float) -> float | None:

@@ -64,10 +64,7 @@ def with_straight_runs(rudder: Series, noise_std: float) -> Series:
         return rudder
     at, angles = np.array(corners).T
     instants = rudder.time_utc_ns[0] + np.round(at * SECOND_NS).astype(np.int64)
-    new = ~np.isin(instants, rudder.time_utc_ns)
-    whole = np.concatenate([rudder.time_utc_ns, instants[new]])
-    order = np.argsort(whole, kind="stable")
-    return Series(whole[order], np.concatenate([value, angles[new]])[order])
+    return Series(rudder.time_utc_ns, value).with_points(instants, angles)
 
 
 def _stands(value: Float) -> list[tuple[int, int]]:

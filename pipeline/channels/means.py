@@ -24,13 +24,29 @@ def mean_about(series: Series, instants: Nanoseconds, over_s: float) -> Float:
         The time about each instant that its mean goes over, s.
     """
     origin = int(series.time_utc_ns[0])
-    own = series.seconds_since(origin)
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (series.value[1:] + series.value[:-1]) * np.diff(own))])
     at = (instants - origin).astype(np.float64) / SECOND_NS
-    first, last = np.clip(at - 0.5 * over_s, own[0], own[-1]), np.clip(at + 0.5 * over_s, own[0], own[-1])
+    return mean_of_line(series.seconds_since(origin), series.value, at, over_s)
+
+
+def mean_of_line(own: Float, value: Float, at: Float, over: float) -> Float:
+    """Return the mean of a line about some places, shape (n,); what it is there where a mean goes over nothing.
+
+    Parameters
+    ----------
+    own, value : ndarray, shape (m,)
+        Its corners; nothing but its ends beyond them.
+    at : ndarray, shape (n,)
+    over : float
+        What each mean goes over about its place, in the unit of the places.
+    """
+    there = np.interp(at, own, value)
+    if not over > 0.0:
+        return there
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (value[1:] + value[:-1]) * np.diff(own))])
+    first, last = np.clip(at - 0.5 * over, own[0], own[-1]), np.clip(at + 0.5 * over, own[0], own[-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = (np.interp(last, own, total) - np.interp(first, own, total)) / (last - first)
-    return np.where(last > first, mean, np.interp(at, own, series.value))
+    return np.where(last > first, mean, there)
 
 
 def curve_of_means(means: Series, instants: Nanoseconds) -> Float:

@@ -45,6 +45,19 @@ class Series:
         first, last = np.searchsorted(self.time_utc_ns, [start_ns, end_ns + 1])
         return Series(self.time_utc_ns[first:last], self.value[first:last])
 
+    def with_points(self, time_utc_ns: Nanoseconds, value: Float) -> Series:
+        """Return the series with more values, but for those at instants that it has.
+
+        Parameters
+        ----------
+        time_utc_ns, value : ndarray, shape (m,)
+            Increasing instants, UTC ns, and what is there.
+        """
+        new = ~np.isin(time_utc_ns, self.time_utc_ns)
+        time = np.concatenate([self.time_utc_ns, time_utc_ns[new]])
+        order = np.argsort(time, kind="stable")
+        return Series(time[order], np.concatenate([self.value, value[new]])[order])
+
     def seconds_since(self, origin_ns: int) -> Float:
         """Return the instants as seconds after ``origin_ns``, shape (n,)."""
         return _seconds(self.time_utc_ns, origin_ns)

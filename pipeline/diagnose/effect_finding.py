@@ -13,9 +13,10 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.diagnose.sizes import as_read, sized_by_refit, stated
+from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.schemas.effect import Effect
 from kempf.schemas.enumeration import listed
+from kempf.schemas.units import as_read
 
 #: said of an effect that improves the prediction while something that repeats itself is left
 NOT_EXPLAINED = "improves the fit, but does not explain the misfit (see what remains)"

@@ -10,6 +10,7 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.final_sizes import Size, refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.schemas.effect import Effect
+from kempf.schemas.units import as_read
 
 
 def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
@@ -36,19 +37,6 @@ def sized(effect: Effect, size: Size) -> str:
 def sized_by_refit(effect: Effect, confirmation: Confirmation) -> str:
     """Return the size of an effect in the refit that it was chosen or refused by."""
     return sized(effect, refitted_size(effect, confirmation))
-
-
-def as_read(unit: str) -> tuple[float, str]:
-    """Return the factor to the unit that people read an angle in, and that; of what has no dimension the unit is empty.
-
-    Examples
-    --------
-    >>> as_read("m/s"), as_read("1")
-    ((1.0, 'm/s'), (1.0, ''))
-    """
-    if unit in ("rad", "rad/s"):
-        return 180.0 / np.pi, unit.replace("rad", "deg")
-    return 1.0, "" if unit == "1" else unit
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:

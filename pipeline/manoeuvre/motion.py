@@ -12,8 +12,7 @@ from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.manoeuvre.helm import DEAD_TIME, pass_through
 from kempf.pipeline.model.batch import ONE
 from kempf.pipeline.model.chain import PSI, F, R, V
-from kempf.pipeline.model.dynamics import CHANNEL, N_BEFORE, PARAMETER, SHIP, SPEED, dynamics
-from kempf.pipeline.model.terms.program import DEPTH
+from kempf.pipeline.model.dynamics import CHANNEL, N_BEFORE, N_INPUT, SPEED, dynamics, room_of
 from kempf.schemas.symbols import SYMBOLS
 
 #: columns of a track: s, m, m, rad, m/s (forward, lateral), rad/s, rad (reading), m along the track
@@ -109,19 +108,16 @@ def _advance(x, s, felt, h, sea, numbers, room, xn, sn):  # type: ignore[no-unty
 @njit(cache=True, nogil=True, error_model="numpy")
 def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignore[no-untyped-def]
     """Return what `rates` needs of a ship in calm, deep water with her shaft turning as on the approach."""
-    width, p = N_BEFORE + extra, values_of_effects.size
-    row = np.zeros(2 + PARAMETER - CHANNEL + 1)
-    values, slopes = np.zeros((PARAMETER + p, 1)), np.zeros((PARAMETER + p, width, 1))
-    for i in range(6):
-        values[SHIP + i, 0] = hull[i, 0]
-    values[SHIP + 6, 0], values[SHIP + 7, 0] = numbers[LENGTH], numbers[DRAUGHT]
-    values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[SHAFT], 1.0
-    for i in range(p):
-        values[PARAMETER + i, 0] = values_of_effects[i]
+    width, row = N_BEFORE + extra, np.zeros(N_INPUT)
     # the shaft turning on, deep water, upright; n and n0 are 1 and V0 is the speed that the shaft keeps
     row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = 1.0, 1e12, day
-    ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
-    stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros(1), np.zeros((width + 1, 1))
+    constants = (
+        *(numbers[ARM], numbers[LENGTH], numbers[DRAUGHT], numbers[SHAFT], 1.0),
+        *(numbers[EXPONENT], numbers[APPROACH]),
+    )
+    ship, values, slopes, stack, by, total = room_of(
+        hull, values_of_effects.reshape((-1, 1)), np.array(constants), (0.0, 0.0, 0.0), width
+    )
     return row, ship, table, values, slopes, stack, by, total, np.zeros((0, width, 1))
 
 

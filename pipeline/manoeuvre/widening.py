@@ -29,9 +29,7 @@ _STEP = 0.1
 _FEWEST = 6
 
 
-def widening(
-    filters: Sequence[RunFilter], levels: Sequence[Float], hull: Float, values: Float, covariance: Float
-) -> float:
+def widening(filters: Sequence[RunFilter], levels: Sequence[Float], hull: Float, values: Float, std: Float) -> float:
     """Return the factor on the standard errors, at least 1.
 
     Parameters
@@ -42,10 +40,9 @@ def widening(
         Noise levels of each, as fitted.
     hull, values : ndarray, shape (6,) and (p,)
         Estimates.
-    covariance : ndarray, shape (6 + p, 6 + p)
-        Of them, for the steps of the difference quotients alone.
+    std : ndarray, shape (6 + p,)
+        Standard errors of them, 0 of one that is held: for the steps of the difference quotients alone.
     """
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     free = np.flatnonzero(std > 0.0)
     if free.size == 0:
         return 1.0
@@ -54,10 +51,10 @@ def widening(
     count = sum(map(len, parts))
     of_log = np.repeat([one.run.day for one in filters], list(map(len, parts)))
     unsure = {one.run.day for one in filters if not one.run.instant_errors.known}
-    legs, means = np.concatenate(parts), 0 if unsure else 1
+    # of the others the maximum takes one mean off, that of all
+    legs, means = np.concatenate(parts), max(len(unsure), 1)
     for day in sorted(unsure):
         legs[of_log == day] -= legs[of_log == day].mean(axis=0)
-        means += 1
     if count - means < _FEWEST - 1:
         return 1.0
     meat = legs.T @ legs * count / (count - means)

@@ -6,11 +6,13 @@ added to what their kind says: to the speed and the rudder that the hull feels, 
 
 from __future__ import annotations
 
+import numpy as np
+
 from kempf.pipeline.compiled import FILLING, STEP, njit
 from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
 from kempf.pipeline.model.lanes import at, choose, everywhere, power, put
 from kempf.pipeline.model.terms.evaluation import evaluate
-from kempf.pipeline.model.terms.program import VARIABLE
+from kempf.pipeline.model.terms.program import DEPTH, VARIABLE
 from kempf.schemas.symbols import SYMBOLS
 
 #: places of symbols among the variables; states come first, in the filter's order
@@ -26,6 +28,39 @@ E, N_BEFORE, N_AFTER, MOST_EXTRA = N_CHAIN, N_CHAIN + 1, 3, 4
 #: what a program is added to; for states of effects the first one's
 ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6
 ON_EXTRA, ON_NOISE, ON_INITIAL = 100, 200, 300
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def room_of(hull, parameters, constants_of_ship, rates, width):  # type: ignore[no-untyped-def]
+    """Return what `dynamics` needs beside states and inputs: the ship, and room for variables and programs.
+
+    Parameters
+    ----------
+    hull, parameters : ndarray, shape (6, lanes) and (p, lanes)
+        Of eq. (16), and of the effects in the order of their programs' variables.
+    constants_of_ship : ndarray, shape (7,)
+        l, L, T, V0, n0, the exponent of V in the rudder's force and the speed of the approach that it goes by.
+    rates : tuple of float
+        Correlation rates of F, M and the speed's error, 1/s.
+    width : int
+        States of chain and effects.
+
+    Returns
+    -------
+    ship : tuple
+    values, slopes : ndarray, shape (m, lanes) and (m, width, lanes)
+        Variables, ship and parameters among them filled, and their derivatives, all 0.
+    stack, by, total : ndarray
+        For programs.
+    """
+    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
+    m, B = PARAMETER + parameters.shape[0], hull.shape[1]
+    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
+    values[SHIP : SHIP + 6] = hull
+    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
+    values[PARAMETER:] = parameters
+    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
+    return (hull, (arm, *rates, exponent, approach)), values, slopes, stack, by, total
 
 
 @njit(**FILLING)

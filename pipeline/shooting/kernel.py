@@ -17,16 +17,14 @@ from kempf.pipeline.model.chain import PSI, R, V
 from kempf.pipeline.model.dynamics import (
     N_AFTER,
     ON_LATERAL,
-    PARAMETER,
-    SHIP,
     SPEED,
     add_programs,
     asks_for_jerk,
     dynamics,
     measured_by,
+    room_of,
 )
 from kempf.pipeline.model.lanes import at, put
-from kempf.pipeline.model.terms.program import DEPTH
 
 #: rows of the inputs over half a step
 HALF = ROWS // 2
@@ -125,14 +123,8 @@ def shoot(  # type: ignore[no-untyped-def]
         To be filled, window after window, m their instants.
     """
     size, width, B = starts.shape[1], starts.shape[1] - N_AFTER, each(lanes)
-    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
-    ship = (hull, (arm, 0.0, 0.0, 0.0, exponent, approach))
-    m = PARAMETER + parameters.shape[0]
-    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
-    values[SHIP : SHIP + 6] = hull
-    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
-    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
-    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
+    ship, values, slopes, stack, by, total = room_of(hull, parameters, constants_of_ship, (0.0, 0.0, 0.0), width)
+    values[SPEED] = inputs[0, 0]
     # no derivatives
     J, x = np.zeros((0, width, B)), np.zeros((size, B))
     k1, k2, k3, k4, xs = (

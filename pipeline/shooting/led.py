@@ -14,9 +14,8 @@ from kempf.pipeline.compiled import njit
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.model.batch import each
 from kempf.pipeline.model.chain import PSI, F, M, R, V
-from kempf.pipeline.model.dynamics import N_BEFORE, PARAMETER, SHIP, SPEED, dynamics
+from kempf.pipeline.model.dynamics import N_BEFORE, SPEED, dynamics, room_of
 from kempf.pipeline.model.lanes import at, put
-from kempf.pipeline.model.terms.program import DEPTH
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -39,14 +38,8 @@ def lead(  # type: ignore[no-untyped-def]
     """
     k, B = states.shape[1], each(lanes)
     width = N_BEFORE + k
-    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
-    ship = (hull, (arm, 0.0, 0.0, 0.0, exponent, approach))
-    m = PARAMETER + parameters.shape[0]
-    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
-    values[SHIP : SHIP + 6] = hull
-    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
-    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
-    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
+    ship, values, slopes, stack, by, total = room_of(hull, parameters, constants_of_ship, (0.0, 0.0, 0.0), width)
+    values[SPEED] = inputs[0, 0]
     J, x = np.zeros((0, width, B)), np.zeros((width, B))
     before, after = np.zeros((width, B)), np.zeros((width, B))
     x[F], x[M] = own[0], own[1]

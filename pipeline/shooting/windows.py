@@ -49,7 +49,7 @@ class Windows:
         For what moves slowly beside it: the states of effects.
         """
         reach = max(2, round(_SMOOTHED * int(np.max(self.ends - self.begins))))
-        return np.column_stack([_mean_about(column, reach) for column in self.run.measured.T])
+        return np.column_stack([_box_means(column, reach) for column in self.run.measured.T])
 
     @cached_property
     def measured(self) -> Float:
@@ -89,7 +89,7 @@ def noise_of(column: Float) -> float:
     return float(np.median(np.abs(third)) / 0.6745 / np.sqrt(20.0)) if third.size > 3 else float("nan")
 
 
-def _mean_about(column: Float, reach: int) -> Float:
+def _box_means(column: Float, reach: int) -> Float:
     """Return the means of what there is within some instants to either side, shape (n,), linear over what is empty."""
     n, there = column.size, np.isfinite(column)
     if not there.any():

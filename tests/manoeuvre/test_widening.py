@@ -35,8 +35,7 @@ def factor(fit: PooledFit, late_s: float = 0.0, errors: InstantErrors | None = N
             RunFilter(replace(own, measured=measured, offset_s=offset, instant_errors=known), EffectModel(), SPEC)
         )
     levels = [np.exp(one) for one in fit.levels]
-    covariance = fit.covariance
-    return widening(filters, levels, fit.hull, np.zeros(0), covariance)
+    return widening(filters, levels, fit.hull, np.zeros(0), fit.std)
 
 
 def test_errors_of_a_model_that_lacks_nothing_are_as_they_are(three: PooledFit) -> None:
@@ -66,4 +65,4 @@ def test_a_few_legs_say_nothing(three: PooledFit) -> None:
     )
     still = replace(short, inputs=np.where(np.arange(short.inputs.shape[1]) == 1, 0.1, short.inputs))
     filters = [RunFilter(still, EffectModel(), SPEC)]
-    assert widening(filters, [np.exp(three.levels[0])], three.hull, np.zeros(0), three.covariance) == 1.0
+    assert widening(filters, [np.exp(three.levels[0])], three.hull, np.zeros(0), three.std) == 1.0

@@ -36,17 +36,15 @@ from kempf.pipeline.model.dynamics import (
     ON_INITIAL,
     ON_LATERAL,
     ON_NOISE,
-    PARAMETER,
-    SHIP,
     SPEED,
     E,
     add_programs,
     asks_for_jerk,
     dynamics,
     measured_by,
+    room_of,
 )
 from kempf.pipeline.model.lanes import at, everywhere, put
-from kempf.pipeline.model.terms.program import DEPTH
 
 #: rows of the input table from one instant to the next, and substeps; a substep reads three rows
 ROWS, SUBSTEPS = 4, 2
@@ -306,16 +304,12 @@ def extended(  # type: ignore[no-untyped-def]
     x, P = x0.copy(), np.zeros((n, n, B))
     for b in range(B):
         P[:, :, b] = P0
-    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
-    ship = (hull, (arm, rates[0], rates[1], rates[3], exponent, approach))
-    m = PARAMETER + parameters.shape[0]
-    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
-    values[SHIP : SHIP + 6] = hull
-    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
-    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
+    ship, values, slopes, stack, by, total = room_of(
+        hull, parameters, constants_of_ship, (rates[0], rates[1], rates[3]), width
+    )
+    values[SPEED] = inputs[0, 0]
     for i in range(width):
         slopes[i, i] = 1.0
-    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
     live, after = _live_states(P0, width)
     there = np.concatenate((live, after))
     drive = np.zeros((5 + width - N_BEFORE, B))

@@ -271,7 +271,8 @@ def make_run(
     known = np.isfinite(record.heading_rad)
     inputs = np.zeros((fine.size, N_INPUT))
     inputs[:, 0] = np.interp(fine, record.time_s, record.speed_m_s)
-    inputs[:, 1] = np.interp(fine, record.time_s, record.rudder_rad)
+    line = _line(instruments.get("rudder_angle"), record, fine)
+    inputs[:, 1] = line.angle_rad[line.grid]
     columns, have = conditions(instruments, record, fine)
     for k, symbol in enumerate(CHANNEL_SYMBOLS):
         inputs[:, 2 + k] = columns.get(symbol, 0.0)
@@ -291,7 +292,7 @@ def make_run(
         start_utc_ns=record.start_utc_ns,
         step_s=step_s,
         inputs=inputs,
-        rudder_line=_line(instruments.get("rudder_angle"), record, fine),
+        rudder_line=line,
         rudder_noise=np.interp(
             time, record.time_s, record.shake_rad_sqrt_s if brief else record.rudder_noise_rad_sqrt_s
         ),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.channels.means import mean_of_line
 from kempf.pipeline.channels.recursion import filtered
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.grid_run import GridRun
@@ -94,20 +95,8 @@ class LoggedSpeed:
 
     def _read(self, course: Float) -> Float:
         """Return what readings show of courses at the run's instants, shape (m, k) of (n, k)."""
-        if not self.over > 0.0:
-            return _between(course, self.at)
-        way = np.vstack([np.zeros(course.shape[1]), np.cumsum(0.5 * (course[1:] + course[:-1]), axis=0)])
-        half = 0.5 * self.over
-        mean: Float = (_between(way, self.at + half) - _between(way, self.at - half)) / self.over
-        return mean
-
-
-def _between(course: Float, at: Float) -> Float:
-    """Interpolate courses, shape (n, k), at some steps, shape (m,)."""
-    first = np.minimum(at.astype(np.int64), len(course) - 2)
-    share = (at - first)[:, None]
-    between: Float = course[first] * (1.0 - share) + course[first + 1] * share
-    return between
+        steps = np.arange(len(course), dtype=np.float64)
+        return np.column_stack([mean_of_line(steps, column, self.at, self.over) for column in course.T])
 
 
 def _yaw_rate(run: GridRun, length_m: float) -> Float | None:
