@@ -185,6 +185,8 @@ class VesselProfile(_Grown):
     wind_arm_per_m: float | None = None
     #: what her magnetic headings lack to true north where no sentence says it, deg, east positive
     variation_deg: float | None = Field(default=None, ge=-180, le=180)
+    #: of a free-running model: length of the ship over that of the model, 45.7 for 1:45.7; all else here is the model's
+    model_scale: float | None = Field(default=None, gt=1, le=1000)
     #: what acts on her beside the rudder, which the model has where none is named: see `surroundings.default_model`;
     #: None: the sea
     surroundings: Literal["tank", "pond", "sea"] | None = None
@@ -193,7 +195,7 @@ class VesselProfile(_Grown):
     #: patterns of the files of an inbox that are her logs, by name or by path below the inbox, such as ``AUR_*.csv``
     inbox: list[str] | None = None
 
-    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings", "inbox"})
+    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings", "inbox", "model_scale"})
 
     def source_for(self, file_name: str) -> Source | None:
         """Return the first source whose pattern matches the file's name (without its folder), or None."""

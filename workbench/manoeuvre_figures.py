@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.schemas.froude import at_full_scale
+
 #: What a figure is called and its unit, by name.
 FIGURES = {
     "advance_m": ("advance", "m"),
@@ -29,6 +31,22 @@ FIGURES = {
     "from_starboard_deg_s": ("yaw rate from starboard at", "deg/s"),
     "from_port_deg_s": ("yaw rate from port at", "deg/s"),
 }
+
+
+def scaled(name: str, figure: Mapping[str, float | None], model_scale: float) -> dict[str, float | None]:
+    """Return value and interval of a model's figure at full scale, by Froude's law.
+
+    Parameters
+    ----------
+    name : str
+        Of the figure, without its place in a list.
+    figure : mapping of str to float or None
+        Such as value, low and high.
+    model_scale : float
+        Length of the ship over that of the model.
+    """
+    unit = FIGURES[name][1]
+    return {key: None if at is None else at_full_scale(at, unit, model_scale) for key, at in figure.items()}
 
 
 def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:

@@ -61,8 +61,8 @@ class CheckedPredictions:
             return replace(predicted, own_zigzags=check.own)
         gear = predicted.prediction.models[0].model.rudder_rate
         models = [replace(model, rudder_rate=gear) for model in check.models]
-        manoeuvre, length_m = predicted.prediction.manoeuvre, predicted.basis.profile.length_m
-        prediction = predict(models, manoeuvre, predicted.basis.logs, length_m, count)
+        basis = predicted.basis
+        prediction = predict(models, predicted.prediction.manoeuvre, basis.logs, basis.particulars, count)
         prediction = replace(prediction, run_away=(*predicted.prediction.run_away, *prediction.run_away))
         limits = limits_of(prediction, predicted.parameter_set)
         return replace(predicted, prediction=prediction, limits=limits, own_zigzags=check.own)

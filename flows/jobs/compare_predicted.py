@@ -141,7 +141,7 @@ def beside(predicted: Predicted, sailed: AsSailed) -> MeasuredManoeuvre:
     models = [sailed.on_the_day(each.model, basis) for each in predicted.prediction.models]
     about = (segment.segment_id, segment.first_side, sailed.speed_m_s, sailed.wind_force_m_s2[0], sailed.sample)
     try:
-        prediction = predict(models, sailed.manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
+        prediction = predict(models, sailed.manoeuvre, basis.logs, basis.particulars, _DRAWS)
     except KempfError as error:
         return MeasuredManoeuvre(*about, (), error.message)
     figures = tuple(

@@ -18,6 +18,7 @@ from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
+from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from kempf.pipeline.segment.spiral import Spiral
@@ -99,7 +100,7 @@ def _with(segment: Segment, standings: Sequence[Standing]) -> Segment:
 
 
 def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
-    criteria = judge(zigzag, profile.length_m, profile.trial_speed_m_s)
+    criteria = judge(zigzag, Particulars.of(profile))
     return Segment(
         segment_id=segment_id(ingest.log_id, zigzag.kind, zigzag.start_utc_ns, zigzag.end_utc_ns),
         vessel=ingest.vessel,
@@ -199,7 +200,7 @@ def _turning_circle(circle: TurningCircle, ingest: Ingest, profile: VesselProfil
         "approach_speed_trend_percent": measurement.approach_speed_trend_percent,
     }
     executes = () if circle.execute_utc_ns is None else (circle.execute_utc_ns,)
-    criteria = judge_circle(circle, profile.length_m, profile.trial_speed_m_s)
+    criteria = judge_circle(circle, Particulars.of(profile))
     segment = _no_zigzag(circle, ingest, "turning_circle", executes, asdict(circle.quality), detail)
     return replace(segment, imo={shown.pop("name"): shown for shown in map(asdict, criteria)})
 

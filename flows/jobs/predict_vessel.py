@@ -79,8 +79,7 @@ def predict_with(
     if request.rudder_rate is not None:
         models = [replace(model, rudder_rate=request.rudder_rate) for model in models]
     progress(0, 1, f"sailing {len(models) * count} ships")
-    profile = basis.profile
-    prediction = predict(models, manoeuvre_of(request), basis.logs, profile.length_m, count, profile.trial_speed_m_s)
+    prediction = predict(models, manoeuvre_of(request), basis.logs, basis.particulars, count)
     progress(1, 1, "sailed")
     assumed = (*assumed_by(request, basis, models, hers.speed_m_s), *hers.remarks)
     parameter_set = hers.parameter_set

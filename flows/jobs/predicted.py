@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
@@ -96,6 +96,11 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
         sentences.append(
             f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres that were sailed"
         )
+    if basis.particulars.model_scale is not None:
+        sentences.append(
+            f"full scale by Froude's law, 1:{basis.particulars.model_scale:g}: what the lower Reynolds number does to "
+            "the model's hull, propeller and rudder is in no interval"
+        )
     rate = request.rudder_rate or basis.rudder_rate
     if request.rudder_rate is not None:
         sentences.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
@@ -108,22 +113,7 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
         )
     if not all("shaft_speed" in run.channels for run in basis.runs.runs):
         sentences.append("no shaft speed in the logs: taken as constant in them")
-    for model in models:
-        if model.fitted_to_legs:
-            sentences.append(
-                f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
-                "predict them worse"
-            )
-        if model.widened > _SAID and model.fitted_to_legs:
-            sentences.append(
-                f"errors of {model.name} widened {model.widened:.1f} times: so much worse it predicts a manoeuvre that "
-                "is left out"
-            )
-        elif model.widened > _SAID:
-            sentences.append(
-                f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
-                "as those of a model that lacks something do"
-            )
+    sentences += [sentence for model in models for sentence in _of_fit(model)]
     for effect in {e.name: e for model in models for e in model.waters.model.effects}.values():
         words = dict.fromkeys(_TAKEN[c] for c in effect.needs if c in _TAKEN)
         if words:
@@ -131,6 +121,22 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
         elif effect.terms and set(effect.terms) <= _INSTRUMENTS:
             sentences.append(f"{effect.name} is in the instruments and does not move the ship")
     return tuple(sentences)
+
+
+def _of_fit(model: Identified) -> Iterator[str]:
+    """Say which parameters a model has, and what its errors were widened by."""
+    if model.fitted_to_legs:
+        yield (
+            f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, predict "
+            "them worse"
+        )
+    if model.widened > _SAID:
+        why = (
+            "so much worse it predicts a manoeuvre that is left out"
+            if model.fitted_to_legs
+            else "over a leg its prediction errors remember, as those of a model that lacks something do"
+        )
+        yield f"errors of {model.name} widened {model.widened:.1f} times: {why}"
 
 
 def limits_of(prediction: Prediction, parameter_set: ParameterSet) -> tuple[str, ...]:

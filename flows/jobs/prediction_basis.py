@@ -26,6 +26,7 @@ from kempf.pipeline.manoeuvre.surge.identify import surge_of
 from kempf.pipeline.manoeuvre.surge.surge_fit import SurgeFit
 from kempf.pipeline.manoeuvre.widening import widening
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.segment.particulars import Particulars
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
@@ -48,6 +49,11 @@ class Basis:
     logs: Reach
     #: Length by which her time scale goes.
     scale_m: float
+
+    @property
+    def particulars(self) -> Particulars:
+        """What the standards need to know of her."""
+        return Particulars.of(self.profile)
 
     @property
     def kept_m(self) -> float | None:

@@ -12,7 +12,8 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.pipeline.segment.imo import SHORTEST_SHIP_M, SLOWEST_SHARE, overshoot_limits
+from kempf.pipeline.segment.imo import overshoot_limits
+from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
 
 #: in ship lengths: 5.3.1 and 5.3.2
 ADVANCE, TACTICAL_DIAMETER, INITIAL_TURNING = 4.5, 5.0, 2.5
@@ -35,11 +36,7 @@ class Judged:
 
 
 def judge(
-    manoeuvre: Manoeuvre,
-    samples: Mapping[str, Float],
-    length_m: float | None,
-    speed_m_s: float,
-    trial_speed_m_s: float | None = None,
+    manoeuvre: Manoeuvre, samples: Mapping[str, Float], vessel: Particulars, speed_m_s: float
 ) -> tuple[Judged, ...]:
     """Judge a manoeuvre by the criteria that apply to it.
 
@@ -47,25 +44,26 @@ def judge(
     ----------
     samples : mapping of str to ndarray, shape (n,)
         Figures of all ships drawn; NaN where one has none, which fulfils nothing.
-    length_m : float or None
-        Between perpendiculars, of the profile.
+    vessel : Particulars
+        Of her profile; a model is judged as the ship that it is one of.
     speed_m_s : float
-        Of the approach.
-    trial_speed_m_s : float, optional
-        Of the profile: the standard asks for nine tenths of it at least.
+        Of the approach; the standard asks for nine tenths of the trial speed at least.
     """
-    criteria = _criteria(manoeuvre, length_m, speed_m_s)
-    short = "" if length_m is None or length_m >= SHORTEST_SHIP_M else _short(length_m)
-    slow = ""
-    if trial_speed_m_s is not None and speed_m_s < SLOWEST_SHARE * trial_speed_m_s:
+    criteria = _criteria(manoeuvre, vessel, speed_m_s)
+    short, full, slow = vessel.too_short, _at_full_scale(vessel, speed_m_s), ""
+    if vessel.too_slow(speed_m_s):
         slow = (
-            f"at {speed_m_s:.3g} m/s, below {100 * SLOWEST_SHARE:.0f} % of the trial speed {trial_speed_m_s:g} m/s, "
-            "which the standard asks for"
+            f"at {speed_m_s:.3g} m/s, below {100 * SLOWEST_SHARE:.0f} % of the trial speed "
+            f"{vessel.trial_speed_m_s:g} m/s, which the standard asks for"
         )
     unknown = "the length of the ship is not known: give it in the profile"
     return tuple(
         Judged(
-            name, limit, unit, float(np.mean(samples[figure] <= limit)), "; ".join(filter(None, (note, short, slow)))
+            name,
+            limit,
+            unit,
+            float(np.mean(samples[figure] <= limit)),
+            "; ".join(filter(None, (full, note, short, slow))),
         )
         if limit is not None
         else Judged(name, None, unit, None, short or unknown)
@@ -74,10 +72,10 @@ def judge(
 
 
 def _criteria(
-    manoeuvre: Manoeuvre, length_m: float | None, speed_m_s: float
+    manoeuvre: Manoeuvre, vessel: Particulars, speed_m_s: float
 ) -> list[tuple[str, str, float | None, str, str]]:
     def lengths(factor: float) -> float | None:
-        return None if length_m is None else factor * length_m
+        return None if vessel.length_m is None else factor * vessel.length_m
 
     if isinstance(manoeuvre, TurningCircle):
         note = "" if manoeuvre.rudder_rad >= radians(34.9) else "the standard asks for 35 deg of rudder, or the most"
@@ -90,8 +88,10 @@ def _criteria(
     angles = tuple(round(float(np.degrees(a)), 6) for a in (manoeuvre.heading_rad, manoeuvre.rudder_rad))
     if angles == (10.0, 10.0):
         # the limits go with the seconds that a ship takes for her length: those of a model are not its ship's
-        limited = length_m is not None and length_m >= SHORTEST_SHIP_M
-        first, second = overshoot_limits(length_m, speed_m_s) if length_m and limited else (None, None)
+        length = vessel.length_of_ship_m
+        first, second = None, None
+        if length is not None and not vessel.too_short:
+            first, second = overshoot_limits(length, vessel.speed_of_ship(speed_m_s))
         return [
             ("initial turning", "initial_turning_m", lengths(INITIAL_TURNING), "m", ""),
             ("10/10 first overshoot", "overshoots_deg.0", first, "deg", ""),
@@ -100,5 +100,10 @@ def _criteria(
     return [("20/20 first overshoot", "overshoots_deg.0", TWENTY, "deg", "")] if angles == (20.0, 20.0) else []
 
 
-def _short(length_m: float) -> str:
-    return f"the ship is {length_m:g} m long, the standard begins at {SHORTEST_SHIP_M:g} m"
+def _at_full_scale(vessel: Particulars, speed_m_s: float) -> str:
+    if vessel.model_scale is None or vessel.length_of_ship_m is None:
+        return ""
+    return (
+        f"judged at full scale, 1:{vessel.model_scale:g}: {vessel.length_of_ship_m:.4g} m long, "
+        f"{vessel.speed_of_ship(speed_m_s):.3g} m/s"
+    )

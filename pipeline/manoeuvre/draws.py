@@ -1,8 +1,8 @@
 """Ships that the data allow: draws from the joint covariance of hull and effects, surge and rudder rate.
 
 The draws are a scrambled Sobol sequence, whose quantiles settle with fewer ships than those of independent numbers
-(Owen 1998, "Scrambling Sobol' and Niederreiter-Xing points", Journal of Complexity 14). They are seeded by the names of
-what is drawn from, so that a prediction is the same to the bit whenever it is made.
+(Owen 1998, "Scrambling Sobol' and Niederreiter-Xing points", Journal of Complexity 14). Their seed
+is always the same, so that a prediction is the same to the bit whenever it is made.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from kempf.pipeline.manoeuvre.covered import Beyond, beyond
 from kempf.pipeline.manoeuvre.criteria import Judged, judge
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre, Reach, Sailed
+from kempf.pipeline.segment.particulars import Particulars
 from kempf.schemas.errors import DataRejected
 
 #: an interval holds 95 %; it needs so many of the ships that were drawn
@@ -92,9 +93,8 @@ def predict(
     models: Sequence[Identified],
     manoeuvre: Manoeuvre,
     logs: Reach,
-    length_m: float | None,
+    vessel: Particulars,
     count: int = DRAWS,
-    trial_speed_m_s: float | None = None,
 ) -> Prediction:
     """Predict a manoeuvre.
 
@@ -105,12 +105,10 @@ def predict(
         sail the manoeuvre is left out: what fits the logs as well may be no ship beyond them.
     logs : Reach
         How far out the logs go.
-    length_m : float or None
-        Of the profile, for the criteria.
+    vessel : Particulars
+        For the criteria.
     count : int, optional
         Ships drawn from every model, a power of two.
-    trial_speed_m_s : float, optional
-        Of the profile, for the criteria.
 
     Raises
     ------
@@ -130,7 +128,7 @@ def predict(
         figures_of(first, sailing),
         sailing,
         beyond(first.reach, logs),
-        judge(manoeuvre, samples, length_m, speed, trial_speed_m_s),
+        judge(manoeuvre, samples, vessel, speed),
         tuple(model.model for model in every if not model.sails),
     )
 

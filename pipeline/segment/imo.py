@@ -7,13 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
 from kempf.pipeline.segment.zigzag import Zigzag
-
-#: The standards apply to ships of this length and more, and to chemical tankers and gas carriers of any length, m.
-SHORTEST_SHIP_M = 100.0
-
-#: The test speed is at least this share of the speed at 85 % of the engine's output.
-SLOWEST_SHARE = 0.9
 
 
 @dataclass(frozen=True)
@@ -38,9 +33,9 @@ def overshoot_limits(length_m: float, speed_m_s: float) -> tuple[float, float]:
     Parameters
     ----------
     length_m : float
-        Length between perpendiculars.
+        Length between perpendiculars, at full scale.
     speed_m_s : float
-        Test speed.
+        Test speed, at full scale.
 
     Returns
     -------
@@ -60,18 +55,15 @@ def overshoot_limits(length_m: float, speed_m_s: float) -> tuple[float, float]:
     return (20.0, 40.0) if ratio >= 30.0 else (5.0 + 0.5 * ratio, 17.5 + 0.75 * ratio)
 
 
-def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None) -> tuple[Criterion, ...]:
+def judge(zigzag: Zigzag, ship: Particulars) -> tuple[Criterion, ...]:
     """Judge a zigzag by the criteria.
 
     Parameters
     ----------
     zigzag : Zigzag
         The manoeuvre.
-    length_m : float or None
-        Length between perpendiculars, from the vessel's profile.
-    trial_speed_m_s : float or None
-        Speed at 85 % of the engine's output, from the vessel's profile. L/V takes the speed measured in the approach,
-        and this one where none was measured.
+    ship : Particulars
+        L/V takes the speed measured in the approach, and the trial speed where none was measured.
 
     Returns
     -------
@@ -84,19 +76,19 @@ def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None)
     """
     angles = (zigzag.psi0_deg, zigzag.delta0_deg)
     measured = zigzag.speed.approach_m_s if zigzag.speed is not None else None
-    speed = measured or trial_speed_m_s
+    speed = measured or ship.trial_speed_m_s
     names: tuple[str, ...] = ("20/20 first overshoot",)
     limits: tuple[float, ...] = (25.0,)
     if angles == (10.0, 10.0):
         names = ("10/10 first overshoot", "10/10 second overshoot")
-        if not length_m or not speed:
-            why = f"the {'length' if not length_m else 'speed'} of the ship is not known"
+        if not ship.length_of_ship_m or not speed:
+            why = f"the {'length' if not ship.length_m else 'speed'} of the ship is not known"
             return tuple(Criterion(name, _overshoot(zigzag, k), None, None, why) for k, name in enumerate(names))
-        limits = overshoot_limits(length_m, speed)
+        limits = overshoot_limits(ship.length_of_ship_m, ship.speed_of_ship(speed))
     elif angles != (20.0, 20.0):
         why = f"the standard knows 10/10 and 20/20 zigzags, this is a {angles[0]:g}/{angles[1]:g} one"
         return (Criterion("overshoot", _overshoot(zigzag, 0), None, None, why),)
-    obstacle = _obstacle(zigzag, length_m, measured, trial_speed_m_s)
+    obstacle = _obstacle(zigzag, ship, measured)
     return tuple(
         _criterion(zigzag, k, name, limit, obstacle) for k, (name, limit) in enumerate(zip(names, limits, strict=True))
     )
@@ -112,17 +104,17 @@ def _overshoot(zigzag: Zigzag, number: int) -> float | None:
     return zigzag.overshoots[number].beyond_nominal_deg if number < len(zigzag.overshoots) else None
 
 
-def _obstacle(zigzag: Zigzag, length_m: float | None, measured_m_s: float | None, trial_m_s: float | None) -> str:
+def _obstacle(zigzag: Zigzag, ship: Particulars, measured_m_s: float | None) -> str:
     """Return why the trial is none in the sense of the standard, or an empty text."""
     if zigzag.quality.start != "steady":
         return "the approach was not steady"
-    if not length_m:
+    if not ship.length_m:
         return "the length of the ship is not known"
-    if length_m < SHORTEST_SHIP_M:
-        return f"the ship is {length_m:g} m long, the standard begins at {SHORTEST_SHIP_M:g} m"
-    if measured_m_s and trial_m_s and measured_m_s < SLOWEST_SHARE * trial_m_s:
+    if ship.too_short:
+        return ship.too_short
+    if measured_m_s and ship.too_slow(measured_m_s):
         return (
             f"the approach speed of {measured_m_s:.1f} m/s is below {100 * SLOWEST_SHARE:.0f} % of the trial speed "
-            f"{trial_m_s:g} m/s"
+            f"{ship.trial_speed_m_s:g} m/s"
         )
     return ""

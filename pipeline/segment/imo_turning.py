@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from kempf.pipeline.segment.imo import SHORTEST_SHIP_M, SLOWEST_SHARE
+from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
 from kempf.pipeline.segment.turning_circle import TurningCircle
 
 #: Rudder at which the standard is judged, deg, and by how much less may have been held, as a share of it.
@@ -30,19 +30,15 @@ class TurningCriterion:
     why: str
 
 
-def judge_circle(
-    circle: TurningCircle, length_m: float | None, trial_speed_m_s: float | None
-) -> tuple[TurningCriterion, ...]:
+def judge_circle(circle: TurningCircle, ship: Particulars) -> tuple[TurningCriterion, ...]:
     """Judge a turning circle by the criteria.
 
     Parameters
     ----------
     circle : TurningCircle
         The manoeuvre.
-    length_m : float or None
-        Length between perpendiculars, from the vessel's profile.
-    trial_speed_m_s : float or None
-        Speed at 85 % of the engine's output, from the vessel's profile.
+    ship : Particulars
+        Of her profile.
 
     Returns
     -------
@@ -53,17 +49,17 @@ def judge_circle(
     ----------
     IMO MSC.137(76), 5.3.1; MSC/Circ.1053.
     """
-    obstacle = _obstacle(circle, length_m, trial_speed_m_s)
+    obstacle = _obstacle(circle, ship)
     judged = []
     for name, (figure, limit) in _LIMITS.items():
         measured = circle.measured.figures[figure]
-        value = None if measured.value is None or not length_m else measured.value / length_m
+        value = None if measured.value is None or not ship.length_m else measured.value / ship.length_m
         why = obstacle or (measured.why if value is None else "")
         judged.append(TurningCriterion(name, value, limit, None if why or value is None else value <= limit, why))
     return tuple(judged)
 
 
-def _obstacle(circle: TurningCircle, length_m: float | None, trial_m_s: float | None) -> str:
+def _obstacle(circle: TurningCircle, ship: Particulars) -> str:
     """Return why the trial is none in the sense of the standard, or an empty text."""
     speed = circle.measured.approach_speed_m_s
     reasons = {
@@ -71,13 +67,11 @@ def _obstacle(circle: TurningCircle, length_m: float | None, trial_m_s: float | 
         f"the standard asks for {_RUDDER_DEG:g} deg of rudder, {circle.delta0_measured_deg:.1f} were held": (
             circle.delta0_measured_deg < (1.0 - _LESS) * _RUDDER_DEG
         ),
-        "the length of the ship is not known": not length_m,
-        f"the ship is {length_m or 0.0:g} m long, the standard begins at {SHORTEST_SHIP_M:g} m": (
-            (length_m or 0.0) < SHORTEST_SHIP_M
-        ),
+        "the length of the ship is not known": not ship.length_m,
+        ship.too_short: bool(ship.too_short),
         # written so that a speed that is not recorded is no obstacle
-        f"the approach speed of {speed:.1f} m/s is below {100 * SLOWEST_SHARE:.0f} % of the trial speed": bool(
-            trial_m_s and speed < SLOWEST_SHARE * trial_m_s
+        f"the approach speed of {speed:.1f} m/s is below {100 * SLOWEST_SHARE:.0f} % of the trial speed": (
+            ship.too_slow(speed)
         ),
     }
     return next((why for why, holds in reasons.items() if holds), "")

@@ -10,6 +10,7 @@ from kempf.pipeline.manoeuvre.prediction import predict
 from kempf.pipeline.manoeuvre.sailed import Reach
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.errors import DataRejected
 from tests.manoeuvre.ships import identified, ship_of, unstable
@@ -19,7 +20,7 @@ CIRCLE = TurningCircle(radians(25.0))
 
 
 def made(model: Identified, manoeuvre=CIRCLE, length: float | None = 160.93):  # type: ignore[no-untyped-def]
-    return predict([model], manoeuvre, LOGS, length, 64)
+    return predict([model], manoeuvre, LOGS, Particulars(length), 64)
 
 
 def test_the_same_parameters_give_the_same_bits_whatever_the_set_is_called() -> None:
@@ -32,7 +33,7 @@ def test_the_same_parameters_give_the_same_bits_whatever_the_set_is_called() -> 
 
 def test_an_interval_holds_95_percent_of_ships_drawn_otherwise() -> None:
     model = identified(ship_of(HULLS["ferry"]), relative=0.03)
-    figure = predict([model], CIRCLE, LOGS, 140.0, 256).figures["tactical_diameter_m"]
+    figure = predict([model], CIRCLE, LOGS, Particulars(140.0), 256).figures["tactical_diameter_m"]
     random = np.random.default_rng(5)
     estimates, inside = model.hull, []
     for _ in range(300):
@@ -50,7 +51,7 @@ def test_models_that_fit_as_well_widen_the_interval_to_hold_them_all() -> None:
     narrow = identified(ship, relative=1e-4)
     drag = ship_of(HULLS["mariner"], cross_flow_drag=(1.0,))
     rival = identified(drag, relative=1e-4, name="ps-0000000000000003")
-    alone, both = made(narrow), predict([narrow, rival], CIRCLE, LOGS, 160.93, 64)
+    alone, both = made(narrow), predict([narrow, rival], CIRCLE, LOGS, Particulars(160.93), 64)
     one, two = alone.figures["tactical_diameter_m"], both.figures["tactical_diameter_m"]
     assert one.value == two.value
     assert one.high is not None
@@ -66,13 +67,15 @@ def test_the_interval_of_a_model_is_not_narrowed_by_surer_ones_beside_it() -> No
     ship = ship_of(HULLS["mariner"])
     unsure = identified(ship, relative=0.03)
     surer = [identified(ship, relative=1e-3, name=f"ps-000000000000000{number}") for number in (3, 4)]
-    alone, beside = made(unsure), predict([unsure, *surer], CIRCLE, LOGS, 160.93, 64)
+    alone, beside = made(unsure), predict([unsure, *surer], CIRCLE, LOGS, Particulars(160.93), 64)
     assert beside.figures == alone.figures
 
 
 def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> None:
     model = identified(ship_of(HULLS["mariner"]))
-    circle = {one.name: one for one in predict([model], TurningCircle(radians(35.0)), LOGS, 160.93, 64).imo}
+    circle = {
+        one.name: one for one in predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(160.93), 64).imo
+    }
     assert circle["advance"].limit == pytest.approx(4.5 * 160.93)
     assert circle["tactical diameter"].probability == 1.0
     zigzag = {one.name: one for one in made(model, Zigzag(radians(10.0), radians(10.0))).imo}
@@ -82,7 +85,7 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     blind = made(model, Zigzag(radians(10.0), radians(10.0)), None).imo
     assert all(one.probability is None and "length" in one.why for one in blind)
     assert made(model, Zigzag(radians(5.0), radians(15.0))).imo == ()
-    some = predict([model], TurningCircle(radians(35.0)), LOGS, 389.0 / 4.5, 64).imo[0]
+    some = predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(389.0 / 4.5), 64).imo[0]
     assert some.probability is not None
     assert 0.0 < some.probability < 1.0
     assert "100 m" in some.why
@@ -91,7 +94,7 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     assert small["10/10 first overshoot"].probability is None
     assert "7 m long" in small["10/10 first overshoot"].why
     assert small["initial turning"].probability is not None
-    slow = predict([model], TurningCircle(radians(35.0)), LOGS, 160.93, 64, trial_speed_m_s=9.0).imo[0]
+    slow = predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(160.93, 9.0), 64).imo[0]
     assert slow.probability == circle["advance"].probability
     assert "below 90 % of the trial speed 9 m/s" in slow.why
 
@@ -112,3 +115,13 @@ def test_draws_that_are_no_ships_are_counted() -> None:
     found = made(loose, length=None)
     assert 0 < found.no_ships < 0.2 * 64
     assert found.share_unstable == 1.0
+
+
+def test_criteria_of_a_model_are_those_of_its_ship() -> None:
+    model, ten = identified(ship_of(HULLS["mariner"])), Zigzag(radians(10.0), radians(10.0))
+    ship = {one.name: one for one in made(model, ten).imo}
+    scaled = {one.name: one for one in predict([model], ten, LOGS, Particulars(160.93 / 4.0, None, 4.0), 64).imo}
+    # half the seconds for a length: those of a ship of a quarter of the length and half the speed are as many
+    assert scaled["10/10 first overshoot"].limit == pytest.approx(5.0 + 0.5 * 160.93 / (7.7175 * 2.0))
+    assert scaled["initial turning"].limit == pytest.approx(ship["initial turning"].limit / 4.0)
+    assert all("judged at full scale, 1:4: 160.9 m long, 15.4 m/s" in one.why for one in scaled.values())

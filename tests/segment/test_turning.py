@@ -14,6 +14,7 @@ from kempf.pipeline.segment.circle_drift import current_by_log
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo_turning import judge_circle
+from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.spiral import Spiral
 from kempf.pipeline.segment.turn_track import TurnTrack
@@ -183,16 +184,16 @@ def test_half_a_turn_is_a_circle_and_says_what_it_lacks() -> None:
 def test_the_criteria_ask_for_the_full_rudder_a_length_and_an_approach() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 560.0)), "ferry")
     circle = circle_of(find_turning(instruments(trial)))
-    judged = {c.name: c for c in judge_circle(circle, 140.0, 10.0)}
+    judged = {c.name: c for c in judge_circle(circle, Particulars(140.0, 10.0))}
     truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
     assert judged["advance"].value_lengths == pytest.approx(truth["advance_m"] / 140.0, rel=0.03)
     assert [judged[name].passed for name in ("advance", "tactical diameter")] == [True, True]
-    assert judge_circle(circle, 101.0, 10.0)[0].passed is (truth["advance_m"] / 101.0 <= 4.5)
-    assert "length" in judge_circle(circle, None, 10.0)[0].why
-    assert "m long" in judge_circle(circle, 99.0, 10.0)[0].why
-    assert "below 90 %" in judge_circle(circle, 140.0, 12.0)[0].why
+    assert judge_circle(circle, Particulars(101.0, 10.0))[0].passed is (truth["advance_m"] / 101.0 <= 4.5)
+    assert "length" in judge_circle(circle, Particulars(None, 10.0))[0].why
+    assert "m long" in judge_circle(circle, Particulars(99.0, 10.0))[0].why
+    assert "below 90 %" in judge_circle(circle, Particulars(140.0, 12.0))[0].why
     small = circle_of(find_turning(instruments(sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry"))))
-    assert "asks for 35 deg" in judge_circle(small, 140.0, 10.0)[0].why
+    assert "asks for 35 deg" in judge_circle(small, Particulars(140.0, 10.0))[0].why
 
 
 def test_a_log_that_begins_in_the_turn_has_no_advance() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
 from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
 from kempf.pipeline.simulate.hulls import HULLS
@@ -98,6 +99,36 @@ def test_overshoots_are_a_list_and_lie_beside_the_measured_ones(warehouse: Path)
     none = predicted(warehouse, "zigzag", "--angles", "5/5", "--compare").out
     assert "not compared, as they are of other angles: 1 with --angles 20/20" in " ".join(none.split())
     assert "no manoeuvre of this kind" in none
+
+
+def test_a_model_is_predicted_at_full_scale_too(warehouse: Path, mariner: Ship, tmp_path: Path) -> None:
+    logs, place = mariner.write(tmp_path / "logs"), tmp_path / "warehouse"
+    (logs / "scale.yaml").write_text("model_scale: 4\n", encoding="utf-8")
+    profiles = ("--profile", logs / "profile.yaml", "--profile", logs / "scale.yaml")
+    assert kempf("ingest", logs / "mariner.csv.gz", *profiles, "--warehouse", place).code == 0
+    assert kempf("identify", "--vessel", "mariner", "--warehouse", place).code == 0
+    for kind in ("turning-circle", "spiral"):
+        shown = predicted(place, kind, "--json").json
+        own = shown["figures"]
+        full = shown["full_scale"]["figures"]
+        assert own.keys() == full.keys()
+        assert predicted(warehouse, kind, "--json").json["full_scale"] is None
+        if kind == "turning-circle":
+            length = yaml.safe_load((logs / "profile.yaml").read_text(encoding="utf-8"))["length_m"]
+            assert shown["full_scale"]["length_m"] == pytest.approx(4.0 * length)
+            assert shown["full_scale"]["speed_m_s"] == pytest.approx(2.0 * shown["speed_m_s"])
+            factors = {"advance_m": 4.0, "time_to_90_s": 2.0, "steady_yaw_rate_deg_s": 0.5, "steady_drift_deg": 1.0}
+            for name, factor in factors.items():
+                for end in ("value", "low", "high"):
+                    assert full[name][end] == pytest.approx(factor * own[name][end]), name
+        else:
+            assert [one["value"] for one in full["from_port_deg_s"]] == pytest.approx(
+                [0.5 * one["value"] for one in own["from_port_deg_s"]]
+            )
+    ran = predicted(place, "turning-circle")
+    assert "at full scale" in ran.out
+    assert "full scale by Froude's law, 1:4: what the lower Reynolds number" in " ".join(ran.out.split())
+    assert "judged at full scale, 1:4:" in " ".join(ran.out.split())
 
 
 @pytest.mark.parametrize("kind", ["turning-circle", "zigzag", "pull-out", "spiral"])

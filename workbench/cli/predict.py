@@ -12,7 +12,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
-from kempf.workbench.manoeuvre_figures import FIGURES, in_words
+from kempf.workbench.manoeuvre_figures import FIGURES, in_words, scaled
 from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
@@ -135,8 +135,11 @@ def _title(predicted: Predicted) -> str:
 def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
     shown = predicted.show()
     manoeuvre = shown["manoeuvre"]
-    rows = [_row(name, f, manoeuvre) for name, f in predicted.prediction.figures.items()]
-    print_table(["figure", "value", "95 % interval", "unit"], rows, _title(predicted))
+    scale = predicted.basis.particulars.model_scale
+    rows = [_row(name, figure, manoeuvre, scale) for name, figure in predicted.prediction.figures.items()]
+    heads = ["figure", "value", "95 % interval", "unit"]
+    heads += [] if scale is None else ["at full scale", "95 % interval"]
+    print_table(heads, rows, _title(predicted))
     if len(shown["models"]) > 1:
         _print_models(predicted)
     for criterion in predicted.prediction.imo:
@@ -161,12 +164,16 @@ def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
         click.echo(f"  drawn: {figure}")
 
 
-def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
+def _row(name: str, figure: Figure, manoeuvre: dict[str, Any], model_scale: float | None) -> list[str]:
     base, _, place = name.partition(".")
     words, unit = in_words(base, int(place) if place else None, manoeuvre), FIGURES[base][1]
     if figure.value is None:
-        return [words, "-", "too few ships have it", unit]
-    return [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
+        return [words, "-", "too few ships have it", unit, *(() if model_scale is None else ("-", "-"))]
+    row = [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
+    if model_scale is None:
+        return row
+    full = scaled(base, vars(figure), model_scale)
+    return [*row, number(full["value"]), f"{number(full['low'])} to {number(full['high'])}"]
 
 
 def _with_half(beside: Beside) -> str:

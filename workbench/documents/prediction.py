@@ -9,7 +9,8 @@ from typing import Any
 from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
 from kempf.flows.jobs.one_sided import OneSided, one_sided
 from kempf.flows.jobs.predicted import Predicted
-from kempf.workbench.manoeuvre_figures import in_words
+from kempf.pipeline.segment.particulars import Particulars
+from kempf.workbench.manoeuvre_figures import in_words, scaled
 
 #: said where fewer than this share of measured figures agree with what is predicted
 _MOST = 0.75
@@ -69,6 +70,7 @@ def prediction_document(
         Where it is drawn.
     """
     document = predicted.show()
+    document["full_scale"] = _full_scale(predicted.basis.particulars, document)
     if measured is not None:
         document |= {
             "measured": [manoeuvre.show() for manoeuvre in measured],
@@ -77,3 +79,16 @@ def prediction_document(
             "other_orders": dict(others),
         }
     return {**document, "figure": figure}
+
+
+def _full_scale(vessel: Particulars, document: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the figures of a model at full scale, grouped as its own are; None of a ship."""
+    scale = vessel.model_scale
+    if scale is None:
+        return None
+    figures = {
+        name: [scaled(name, one, scale) for one in entry] if isinstance(entry, list) else scaled(name, entry, scale)
+        for name, entry in document["figures"].items()
+    }
+    speed = vessel.speed_of_ship(document["speed_m_s"])
+    return {"model_scale": scale, "length_m": vessel.length_of_ship_m, "speed_m_s": speed, "figures": figures}
