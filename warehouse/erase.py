@@ -44,10 +44,10 @@ def erase(warehouse: Warehouse, name: str, vessel: str, column: str, values: Col
     live = with_retry(attempt)
     # files of versions from before layout 4 are in a folder of another name
     among = (key, earlier_key(vessel)) if "vessel_key" in TABLES[name].partition_by else ()
-    hers = tuple(f"vessel_key={spelling}/" for spelling in among) or ("",)
+    partitions = tuple(f"vessel_key={spelling}/" for spelling in among) or ("",)
     for path in warehouse.paths_below(name):
         parts = path.split("/")
-        if parts[0] == "_delta_log" or not any(folder in path for folder in hers):
+        if parts[0] == "_delta_log" or not any(folder in path for folder in partitions):
             continue
         data = path.endswith(".parquet") and parts[-1] not in live
         if (data and _holds(warehouse, (name, *parts), column, values)) or _HALF in parts[-1]:

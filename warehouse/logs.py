@@ -47,8 +47,8 @@ def all_ingests(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]
     """Return every recorded ingest, of one vessel or of all, sorted by start, log and revision."""
     if vessel is None:
         return _all_ingests(warehouse, {})
-    hers = {"vessel_key": vessel_key(vessel)}
-    return list(remembered(warehouse, ("logs",), ("ingests", vessel), partial(_all_ingests, warehouse, hers)))
+    of_vessel = {"vessel_key": vessel_key(vessel)}
+    return list(remembered(warehouse, ("logs",), ("ingests", vessel), partial(_all_ingests, warehouse, of_vessel)))
 
 
 def _all_ingests(warehouse: Warehouse, where: Where) -> list[LogRow]:

@@ -200,11 +200,11 @@ def as_stored(warehouse: Warehouse, name: str, vessel: str | None = None) -> Par
     UsageError
         ``ambiguous_parameter_set``: several begin so.
     """
-    hers: dict[str, str | list[str]] = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    found_whole = delta.read(warehouse, "parameter_sets", {**hers, "parameter_set_id": name})
+    of_vessel: dict[str, str | list[str]] = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    found_whole = delta.read(warehouse, "parameter_sets", {**of_vessel, "parameter_set_id": name})
     if found_whole.height:
         return _set(found_whole.rows(named=True)[0])
-    ids = delta.read(warehouse, "parameter_sets", hers, ("parameter_set_id",))["parameter_set_id"].to_list()
+    ids = delta.read(warehouse, "parameter_sets", of_vessel, ("parameter_set_id",))["parameter_set_id"].to_list()
     names = sorted(candidate for candidate in ids if candidate.startswith(name))
     if not name.strip() or not names:
         raise NotFound(
@@ -244,8 +244,8 @@ def all_as_stored(warehouse: Warehouse, vessel: str, names: Collection[str] | No
     if names is not None and not names:
         warehouse.require()
         return []
-    hers: dict[str, str | list[str]] = {"vessel_key": vessel_key(vessel)}
-    chosen = hers if names is None else {**hers, "parameter_set_id": sorted(names)}
+    of_vessel: dict[str, str | list[str]] = {"vessel_key": vessel_key(vessel)}
+    chosen = of_vessel if names is None else {**of_vessel, "parameter_set_id": sorted(names)}
     frame = delta.read(warehouse, "parameter_sets", chosen).sort("start_utc_ns", "parameter_set_id")
     return [_set(row) for row in frame.rows(named=True)]
 

@@ -148,9 +148,9 @@ def replace(warehouse: Warehouse, manoeuvres: Mapping[tuple[str, str], Sequence[
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "segments") as table:
-            hers: Where = {"vessel_key": sorted(keys.values()), "ingest_id": sorted(of_ingest)}
+            of_vessel: Where = {"vessel_key": sorted(keys.values()), "ingest_id": sorted(of_ingest)}
             known: dict[str, list[Segment]] = {}
-            for row in delta.rows(table, "segments", hers).rows(named=True):
+            for row in delta.rows(table, "segments", of_vessel).rows(named=True):
                 known.setdefault(row["ingest_id"], []).append(_segment(row))
             changed = tuple(
                 ingest
@@ -230,8 +230,8 @@ def _found_in(warehouse: Warehouse, vessel: str | None) -> list[Segment]:
 
 def of_ingests(warehouse: Warehouse, ingests: Sequence[str], vessel: str | None = None) -> list[Segment]:
     """Return the manoeuvres of every kind found in some ingests, of one vessel or of any, sorted by start, then id."""
-    hers = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    frame = delta.read(warehouse, "segments", {**hers, "ingest_id": list(ingests)})
+    of_vessel = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    frame = delta.read(warehouse, "segments", {**of_vessel, "ingest_id": list(ingests)})
     return _sorted([_segment(row) for row in frame.rows(named=True)])
 
 

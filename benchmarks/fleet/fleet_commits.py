@@ -78,7 +78,7 @@ def at(warehouse: Warehouse, template: Template, n: int) -> dict[str, Any]:
     return {
         "vessels": n,
         "files": len(filled.file_uris()),
-        "read": _medians([_timed(partial(parameter_sets.get_all, warehouse, hers)) for hers in asked]),
+        "read": _medians([_timed(partial(parameter_sets.get_all, warehouse, names)) for names in asked]),
         "one": timed(1),
         "together": timed(TOGETHER),
         "writers": {str(k): _at_once(warehouse, new, n, filled.version(), k) for k in WRITERS if k * TOGETHER <= n},
@@ -100,8 +100,8 @@ def _sets(one: ParameterSet, n: int) -> _New:
 
     def new(vessels: int, writer: int = 0, writers: int = 1) -> list[ParameterSet]:
         number, share = next(numbers), n // writers
-        hers = [writer * share + (number * TOGETHER + v) % share for v in range(vessels)]
-        return [replace(one, parameter_set_id=f"ps-{number:08x}{v:08x}", vessel=f"vessel {v}") for v in hers]
+        names = [writer * share + (number * TOGETHER + v) % share for v in range(vessels)]
+        return [replace(one, parameter_set_id=f"ps-{number:08x}{v:08x}", vessel=f"vessel {v}") for v in names]
 
     return new
 

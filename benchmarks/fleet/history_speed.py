@@ -94,10 +94,10 @@ def copies(
             "parameters": pl.from_arrow(pa.ListArray.from_arrays(offsets, stated)),
         }
     )
-    hers = own.select("vessel_key", "vessel").with_columns(
+    of_vessels = own.select("vessel_key", "vessel").with_columns(
         log_id=pl.Series(ids), ingest_id=pl.Series([name[16:32] for name in ids])
     )
-    return _filled(own, template.sets), _filled(hers, template.logs)
+    return _filled(own, template.sets), _filled(of_vessels, template.logs)
 
 
 def _filled(own: pl.DataFrame, template: pl.DataFrame) -> pl.DataFrame:

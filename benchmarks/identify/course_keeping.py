@@ -161,10 +161,10 @@ def tables(runs: list[Run]) -> list[str]:
     """One table a ship."""
     lines: list[str] = []
     for ship in SHIPS:
-        hers = [s for r in runs if r.ship == ship for s in r.steered]
+        of_ship = [s for r in runs if r.ship == ship for s in r.steered]
         rows = []
         for name in LAWS:
-            tried = [s for s in hers if s.law == name]
+            tried = [s for s in of_ship if s.law == name]
             good = [s for s in tried if s.good]
             counts = [str(len(tried)), str(sum(not s.failure for s in tried)), str(len(good))]
             settled = [s.change.settled_s for s in good]
@@ -228,9 +228,9 @@ def draw(runs: list[Run]) -> list[str]:
     figure, axes = plt.subplots(2, len(SHIPS), figsize=(12, 6.5), layout="constrained", sharex=True, sharey="row")
     for column, ship in enumerate(SHIPS):
         for k, law in enumerate(LAWS):
-            hers = [s for r in runs if r.ship == ship for s in r.steered if s.law == law and s.loop is not None]
+            of_ship = [s for r in runs if r.ship == ship for s in r.steered if s.law == law and s.loop is not None]
             for row, name in enumerate(("heading rms, deg", "modulus margin")):
-                for s, x in zip(hers, k + np.linspace(-0.2, 0.2, len(hers)), strict=True):
+                for s, x in zip(of_ship, k + np.linspace(-0.2, 0.2, len(of_ship)), strict=True):
                     style = {"color": f"C{k}", "marker": "o" if s.good else "x", "ms": 5, "ls": ""}
                     axes[row, column].plot(x, COLUMNS[name](s), **style)
         axes[0, column].set(title=ship, yscale="log")

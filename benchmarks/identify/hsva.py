@@ -73,10 +73,10 @@ def collect(warehouse: Warehouse, data: Path) -> list[Found]:
     found = []
     for path, outcome in zip(ship.logs, taken, strict=True):
         first = outcome.segments[0]
-        hers = {method: outcomes[first.segment_id] for method, outcomes in by_method.items()}
-        made = hers["default"].parameter_set
+        by_estimator = {method: outcomes[first.segment_id] for method, outcomes in by_method.items()}
+        made = by_estimator["default"].parameter_set
         size = _size(warehouse, first, made) if made else float("nan")
-        found.append(Found(ordered(path.stem), outcome.segments, hers, size))
+        found.append(Found(ordered(path.stem), outcome.segments, by_estimator, size))
     return found
 
 

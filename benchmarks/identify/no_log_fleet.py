@@ -77,8 +77,8 @@ def zigzags(data: Path, days: int = 2) -> list[Zigzag]:
 
 def companions(zigzag: Zigzag, every: list[Zigzag]) -> tuple[Record, ...]:
     """Return the runs that `kempf identify` would take beside one."""
-    hers = [z for z in every if z.ship == zigzag.ship]
-    return tuple(hers[i].blind for i in companions_of(zigzag.passage, [z.passage for z in hers]))
+    of_ship = [z for z in every if z.ship == zigzag.ship]
+    return tuple(of_ship[i].blind for i in companions_of(zigzag.passage, [z.passage for z in of_ship]))
 
 
 def compare(zigzag: Zigzag, others: tuple[Record, ...]) -> list[Found]:

@@ -46,12 +46,12 @@ class CheckedPredictions:
 
     def __init__(self, warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent) -> None:
         self._warehouse = warehouse
-        self._hers = models_of_set(warehouse, vessel, request, progress)
+        self._set_models = models_of_set(warehouse, vessel, request, progress)
         self._checks: dict[tuple[str, ...], _Check] = {}
 
     def predict(self, request: PredictRequest, progress: Progress = silent, count: int = DRAWS) -> Predicted:
         """Predict one, see `predict_checked`; set and speed are those of the first request."""
-        predicted = predict_with(self._hers, request, progress, count)
+        predicted = predict_with(self._set_models, request, progress, count)
         # a model whose ships do not sail the manoeuvre is left out, of the check too
         names = tuple(member.model.name for member in predicted.prediction.models)
         if names not in self._checks:

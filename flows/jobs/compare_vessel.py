@@ -113,21 +113,21 @@ def compare_vessel(
     return compared(bound(warehouse, vessel, set_id, progress), asked, progress)
 
 
-def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> Comparison:
+def compared(bound_runs: BoundRuns, horizon: Horizon, progress: Progress = silent) -> Comparison:
     """Predict every run at a horizon; errors are those of `compare_vessel`.
 
     Where predictions with the set take the likelihood's parameters, a free run is with these.
     """
-    if hers.legs is None and horizon.name == "legs":
+    if bound_runs.legs is None and horizon.name == "legs":
         horizon = horizon_of("free")
-    runs, segments, skipped = [], [], dict(hers.skipped)
-    for k, bound_run in enumerate(hers.runs):
-        progress(k, len(hers.runs), f"predicting {bound_run.segment.segment_id}")
+    runs, segments, skipped = [], [], dict(bound_runs.skipped)
+    for k, bound_run in enumerate(bound_runs.runs):
+        progress(k, len(bound_runs.runs), f"predicting {bound_run.segment.segment_id}")
         try:
             run = compare_run(
-                *(bound_run.filtered, Point(hers.hull, hers.values, bound_run.levels.foreseen), horizon),
+                *(bound_run.filtered, Point(bound_runs.hull, bound_runs.values, bound_run.levels.foreseen), horizon),
                 held_out=bound_run.held_out,
-                legs=hers.legs,
+                legs=bound_runs.legs,
                 levels_from=bound_run.levels.source,
                 own_levels=bound_run.levels.own,
                 phases=phases_s(bound_run.segment.detail.get("phases", ()), bound_run.filtered.run.start_utc_ns),
@@ -138,16 +138,18 @@ def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> 
             continue
         runs.append(run)
         segments.append(bound_run.segment)
-    progress(len(hers.runs), len(hers.runs), "predicted")
+    progress(len(bound_runs.runs), len(bound_runs.runs), "predicted")
     if not runs:
         raise DataRejected(
             "nothing_to_compare",
-            f"{hers.parameter_set.parameter_set_id} predicts none of the {len(hers.runs)} manoeuvres of "
-            f"{hers.vessel!r}: " + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
+            f"{bound_runs.parameter_set.parameter_set_id} predicts none of the {len(bound_runs.runs)} manoeuvres of "
+            f"{bound_runs.vessel!r}: " + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
             "Ask for another horizon, or compare another parameter set with --set.",
             {"skipped": skipped},
         )
-    return Comparison(hers.vessel, hers.parameter_set, hers.alias, horizon, tuple(runs), tuple(segments), skipped)
+    return Comparison(
+        bound_runs.vessel, bound_runs.parameter_set, bound_runs.alias, horizon, tuple(runs), tuple(segments), skipped
+    )
 
 
 def _turns(segment: Segment, run: GridRun) -> tuple[Turn, ...]:

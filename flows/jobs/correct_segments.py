@@ -260,8 +260,8 @@ def _overlap(beside: Segment) -> UsageError:
 
 def _with(log_corrections: Sequence[Correction], correction: Correction) -> tuple[Correction, ...]:
     """Return what was said of a log with one more; a command that was killed and is repeated says nothing more."""
-    mine = [entry for entry in log_corrections if entry.subject_utc_ns == correction.subject_utc_ns]
-    return tuple(log_corrections) if mine and mine[-1] == correction else (*log_corrections, correction)
+    on_subject = [entry for entry in log_corrections if entry.subject_utc_ns == correction.subject_utc_ns]
+    return tuple(log_corrections) if on_subject and on_subject[-1] == correction else (*log_corrections, correction)
 
 
 def _subject(segment: Segment) -> Bounds | None:

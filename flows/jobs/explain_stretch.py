@@ -79,26 +79,26 @@ def explain_stretch(
     """
     if end_utc_ns <= start_utc_ns:
         raise UsageError("window_empty", "The stretch ends before it begins.", "Give a later end.")
-    hers = bound(warehouse, vessel, set_id, progress)
-    run = _run_of(hers, start_utc_ns, end_utc_ns, segment_id or "")
-    used = [bound_run for bound_run in hers.runs if not bound_run.held_out]
+    bound_runs = bound(warehouse, vessel, set_id, progress)
+    run = _run_of(bound_runs, start_utc_ns, end_utc_ns, segment_id or "")
+    used = [bound_run for bound_run in bound_runs.runs if not bound_run.held_out]
     if not used:
         raise DataRejected(
             "nothing_fitted",
-            f"None of the manoeuvres that {hers.parameter_set.parameter_set_id} was fitted to is left.",
+            f"None of the manoeuvres that {bound_runs.parameter_set.parameter_set_id} was fitted to is left.",
             "Choose another set with --set, or bring her up to date with `kempf reprocess`.",
         )
     runs = used if not run.held_out else [*used, run]
     time = instants_utc_ns(run.filtered.run)
-    known = known_effects(Own.from_json(hers.parameter_set.settings.get("own") or {}))
+    known = known_effects(Own.from_json(bound_runs.parameter_set.settings.get("own") or {}))
     progress(0, 1, f"scoring {len(known)} effects")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         # no step of the search: what the set says is looked at as it is
         base = fit(
             [bound_run.filtered for bound_run in runs],
-            hers.hull,
+            bound_runs.hull,
             np.array([bound_run.levels.own for bound_run in runs]),
-            hers.values,
+            bound_runs.values,
             workers,
             max_iterations=0,
         )
@@ -111,19 +111,19 @@ def explain_stretch(
             workers,
         )
     progress(1, 1, "scored")
-    return ExplainedStretch(vessel, hers.parameter_set, run, start_utc_ns, end_utc_ns, explanation)
+    return ExplainedStretch(vessel, bound_runs.parameter_set, run, start_utc_ns, end_utc_ns, explanation)
 
 
-def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int, name: str) -> BoundRun:
+def _run_of(bound_runs: BoundRuns, start_utc_ns: int, end_utc_ns: int, name: str) -> BoundRun:
     """Return the manoeuvre that a stretch lies in; the stretch may reach beyond its ends."""
     spans = []
     runs = []
-    named = [run for run in hers.runs if run.segment.segment_id.startswith(name)]
+    named = [run for run in bound_runs.runs if run.segment.segment_id.startswith(name)]
     if not named:
         raise NotFound(
             "no_run",
-            f"No manoeuvre of {hers.vessel!r} that can be predicted is called {name!r}.",
-            f"`kempf segments --vessel {hers.vessel}` lists them.",
+            f"No manoeuvre of {bound_runs.vessel!r} that can be predicted is called {name!r}.",
+            f"`kempf segments --vessel {bound_runs.vessel}` lists them.",
             {"segment_id": name},
         )
     for run in named:
@@ -134,7 +134,7 @@ def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int, name: str) -> B
     if not runs:
         raise NotFound(
             "no_stretch",
-            f"No manoeuvre of {hers.vessel!r} that can be predicted is between {iso_utc(start_utc_ns)} and "
+            f"No manoeuvre of {bound_runs.vessel!r} that can be predicted is between {iso_utc(start_utc_ns)} and "
             f"{iso_utc(end_utc_ns)}.",
             "Choose a stretch of one of them: " + "; ".join(spans[:10]) + ".",
         )

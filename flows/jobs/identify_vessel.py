@@ -175,9 +175,9 @@ def identify_segments(
         else:
             outcomes.append(IdentifyOutcome(task.segment, None, set_id=task.set_id, converged=held.converged))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
-        for done, (ingest, hers) in enumerate(missing.items()):
-            progress(done, len(missing), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
-            log_outcomes = _identify_log(warehouse, vessel, hers, pool, flow_run, table_versions, by_ingest)
+        for done, (ingest, log_segments) in enumerate(missing.items()):
+            progress(done, len(missing), f"identifying {len(log_segments)} segments of {by_ingest[ingest].file_name}")
+            log_outcomes = _identify_log(warehouse, vessel, log_segments, pool, flow_run, table_versions, by_ingest)
             outcomes += log_outcomes
             new.keep([o.parameter_set for o in log_outcomes if o.parameter_set])
     progress(len(missing), len(missing), "done")

@@ -215,36 +215,39 @@ def next_trial(
         ``predicts_no_ship``: by the set's model she can sail none of the zigzags; ``set_without_covariance``.
     """
     request = PredictRequest("zigzag", set_id)
-    hers = models_of_set(warehouse, vessel, request, progress)
-    models = [_model(bound(warehouse, vessel, model.name, progress), model) for model in hers.models]
-    of_ship = [name for name in models[0].known_names if name in _names_of_ship(hers.models[0])]
+    set_models = models_of_set(warehouse, vessel, request, progress)
+    models = [_model(bound(warehouse, vessel, model.name, progress), model) for model in set_models.models]
+    of_ship = [name for name in models[0].known_names if name in _names_of_ship(set_models.models[0])]
     if parameter is not None and parameter not in of_ship:
         raise UsageError(
             "parameter_unknown",
-            f"{parameter!r} is no parameter of {hers.parameter_set.parameter_set_id} with a standard error.",
+            f"{parameter!r} is no parameter of {set_models.parameter_set.parameter_set_id} with a standard error.",
             f"Name one of {', '.join(of_ship)}.",
             {"expected": of_ship},
         )
     trials = []
     for done, angles in enumerate(ANGLES_DEG):
         progress(done, len(ANGLES_DEG), "sailing zigzag {:g}/{:g}".format(*angles))
-        trial = _trial(angles, models, hers.basis.logs.rudder_rad, parameter, of_ship)
+        trial = _trial(angles, models, set_models.basis.logs.rudder_rad, parameter, of_ship)
         if trial is not None:
             trials.append(trial)
     if not trials:
         raise DataRejected(
             "predicts_no_ship",
-            f"By {hers.parameter_set.parameter_set_id} she runs away in every one of the {len(ANGLES_DEG)} zigzags.",
+            f"By {set_models.parameter_set.parameter_set_id} she runs away in every one of the {len(ANGLES_DEG)} "
+            "zigzags.",
             "Choose another set with --set; `kempf params list` names them.",
         )
     trials.sort(key=lambda trial: _rank(trial, parameter))
-    predicted = predict_with(hers, replace(request, angles_deg=trials[0].angles_deg), progress)
-    effects = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
+    predicted = predict_with(set_models, replace(request, angles_deg=trials[0].angles_deg), progress)
+    effects = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in set_models.models}
     remarks = (
-        *(f"{remark[0].upper()}{remark[1:]}." for remark in hers.remarks),
+        *(f"{remark[0].upper()}{remark[1:]}." for remark in set_models.remarks),
         "A turning circle or a pull-out is not among them: models are held against these, never fitted.",
     )
-    return NextTrial(vessel, hers.parameter_set, effects, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
+    return NextTrial(
+        vessel, set_models.parameter_set, effects, set_models.speed_m_s, parameter, tuple(trials), predicted, remarks
+    )
 
 
 def _rank(trial: Trial, parameter: str | None) -> tuple[float, float]:

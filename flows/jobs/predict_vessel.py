@@ -71,18 +71,24 @@ def models_of_set(
 
 
 def predict_with(
-    hers: ModelsOfSet, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
+    set_models: ModelsOfSet, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
 ) -> Predicted:
     """Predict a manoeuvre with models that are there; set and speed are theirs, errors are `predict_vessel`'s."""
     required(request)
-    models, basis = list(hers.models), hers.basis
+    models, basis = list(set_models.models), set_models.basis
     if request.rudder_rate is not None:
         models = [replace(model, rudder_rate=request.rudder_rate) for model in models]
     progress(0, 1, f"sailing {len(models) * count} ships")
     prediction = predict(models, manoeuvre_of(request), basis.logs, basis.particulars, count)
     progress(1, 1, "sailed")
-    assumed = (*assumed_by(request, basis, models, hers.speed_m_s), *hers.remarks)
-    parameter_set = hers.parameter_set
+    assumed = (*assumed_by(request, basis, models, set_models.speed_m_s), *set_models.remarks)
+    parameter_set = set_models.parameter_set
     return Predicted(
-        hers.vessel, parameter_set, basis, hers.speed_m_s, prediction, assumed, limits_of(prediction, parameter_set)
+        set_models.vessel,
+        parameter_set,
+        basis,
+        set_models.speed_m_s,
+        prediction,
+        assumed,
+        limits_of(prediction, parameter_set),
     )

@@ -132,8 +132,8 @@ def verify_all(
         if before is not None:
             by_name[name] = _remembered(before)
     done = len(by_name)
-    for vessel, of_hers in groupby(pairs, key=lambda pair: pair[0]):
-        names = [name for _, name in of_hers if name not in by_name]
+    for vessel, vessel_pairs in groupby(pairs, key=lambda pair: pair[0]):
+        names = [name for _, name in vessel_pairs if name not in by_name]
         for group in _groups(parameter_sets.all_as_stored(warehouse, vessel, names)):
             progress(done, len(pairs), f"{vessel}: building {len(group)} parameter sets again")
             verdicts = _verify(warehouse, group, tolerance)

@@ -133,11 +133,11 @@ def stored_model(
 def effect_settings(spec: ModelSpec, own: Own) -> dict[str, Any]:
     """Return what pins the effects of a model: their digests, and the texts of those that are not in the catalogue."""
     used = named(spec.effects, known_effects(own))
-    mine = Own(
+    in_model = Own(
         {n: t for n, t in own.formulas.items() if n in spec.effects},
         {n: t for n, t in own.files.items() if n in spec.effects},
     )
-    return {"effects": {effect.name: effect.sha256 for effect in used}, "own": mine.as_json()}
+    return {"effects": {effect.name: effect.sha256 for effect in used}, "own": in_model.as_json()}
 
 
 def point(warehouse: Warehouse, model: ParameterSet, expected: str | EllipsisType | None = ...) -> None:

@@ -29,9 +29,9 @@ def formula_of_ones_own(name: str, formula: str) -> Own:
             f"The formula has {len(formula)} letters; at most {LONGEST} are read.",
             "Write it shorter, or as the YAML file of an effect.",
         )
-    mine = Own(formulas={name: (formula,)})
-    mine.effects()
-    return mine
+    own = Own(formulas={name: (formula,)})
+    own.effects()
+    return own
 
 
 def tried(
@@ -57,11 +57,11 @@ def tried(
     from kempf.pipeline.diagnose.diagnosis_json import as_json
     from kempf.pipeline.diagnose.settings import DiagnosisSettings
 
-    mine = formula_of_ones_own(name, formula)
+    tried = formula_of_ones_own(name, formula)
     spec, own = standing_model(warehouse, vessel)
     chosen = choose(warehouse, vessel)
     settings = DiagnosisSettings(level=1.0, refits=1, certain_std=0.0, most_steps=1)
-    examined = examine(warehouse, chosen, spec, own.beside(mine), settings, progress, only=(name,))
+    examined = examine(warehouse, chosen, spec, own.beside(tried), settings, progress, only=(name,))
     document = as_json(examined.diagnosis)
     content = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     return dict(content)

@@ -130,77 +130,77 @@ def what_if(
     DataRejected
         ``prediction_diverges``: the estimate itself runs away.
     """
-    hers = bound(warehouse, vessel, set_id, progress)
-    parameters = {p.name: p for p in hers.parameter_set.parameters if p.name in hers.names}
+    bound_runs = bound(warehouse, vessel, set_id, progress)
+    parameters = {p.name: p for p in bound_runs.parameter_set.parameters if p.name in bound_runs.names}
     if parameter not in parameters:
         raise NotFound(
             "no_parameter",
-            f"{hers.parameter_set.parameter_set_id} has no parameter {parameter[:60]!r}.",
+            f"{bound_runs.parameter_set.parameter_set_id} has no parameter {parameter[:60]!r}.",
             f"Choose one of {', '.join(parameters)}.",
             {"parameters": list(parameters)},
         )
-    estimate, place = parameters[parameter], hers.names.index(parameter)
-    by_legs = by_name(hers.parameter_set) if shown_by_legs(hers.parameter_set) else {}
-    if hers.legs is not None and by_legs:
+    estimate, place = parameters[parameter], bound_runs.names.index(parameter)
+    by_legs = by_name(bound_runs.parameter_set) if shown_by_legs(bound_runs.parameter_set) else {}
+    if bound_runs.legs is not None and by_legs:
         # the ship that predictions are made with
-        hers = replace(hers, hull=hers.legs[0], values=hers.legs[1])
+        bound_runs = replace(bound_runs, hull=bound_runs.legs[0], values=bound_runs.legs[1])
         if parameter in by_legs:
             estimate = replace(estimate, value=by_legs[parameter][0], std=by_legs[parameter][1])
-    run = _run(hers, segment_id)
+    run = _run(bound_runs, segment_id)
     std = estimate.std if estimate.std is not None and np.isfinite(estimate.std) and estimate.std > 0.0 else None
     step = _STEP * std if std is not None else _SHARE * abs(estimate.value) or 1e-6
     moves = np.arange(-_SIDE, _SIDE + 1)
-    here = _log_likelihood(hers, place, 0.0)
+    here = _log_likelihood(bound_runs, place, 0.0)
     if not np.isfinite(here):
         raise DataRejected(
             "prediction_diverges",
-            f"{hers.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
+            f"{bound_runs.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
             "Choose another set with --set.",
         )
     tried = []
     for done, move in enumerate(moves.tolist()):
         progress(done, moves.size, f"{parameter} at {estimate.value + move * step:.4g}")
-        moved = _moved(hers, place, move * step)
+        moved = _moved(bound_runs, place, move * step)
         free = free_run_of(run.filtered, *moved)
         error = 100.0 * free.relative_error
         tried.append(
             Tried(
                 estimate.value + move * step,
                 move * _STEP if std is not None else None,
-                here - _log_likelihood(hers, place, move * step),
+                here - _log_likelihood(bound_runs, place, move * step),
                 float(error) if np.isfinite(error) else None,
                 free.predicted,
             )
         )
     progress(moves.size, moves.size, "tried")
-    about = (vessel, hers.parameter_set, parameter, estimate.unit, estimate.value, std, run)
+    about = (vessel, bound_runs.parameter_set, parameter, estimate.unit, estimate.value, std, run)
     return WhatIf(*about, tuple(tried), bool(by_legs))
 
 
-def _run(hers: BoundRuns, segment_id: str | None) -> BoundRun:
+def _run(bound_runs: BoundRuns, segment_id: str | None) -> BoundRun:
     if segment_id:
-        runs = [run for run in hers.runs if run.segment.segment_id.startswith(segment_id)]
+        runs = [run for run in bound_runs.runs if run.segment.segment_id.startswith(segment_id)]
         if len(runs) != 1:
             raise NotFound(
                 "no_run",
                 f"{segment_id[:40]!r} is {'several' if runs else 'none'} of the manoeuvres that can be predicted.",
-                "Choose one of " + ", ".join(run.segment.segment_id for run in hers.runs) + ".",
+                "Choose one of " + ", ".join(run.segment.segment_id for run in bound_runs.runs) + ".",
             )
         return runs[0]
-    among = [run for run in hers.runs if run.held_out] or list(hers.runs)
-    return max(among, key=lambda run: free_run_of(run.filtered, hers.hull, hers.values).relative_error)
+    among = [run for run in bound_runs.runs if run.held_out] or list(bound_runs.runs)
+    return max(among, key=lambda run: free_run_of(run.filtered, bound_runs.hull, bound_runs.values).relative_error)
 
 
-def _moved(hers: BoundRuns, place: int, by: float) -> tuple[Float, Float]:
-    both = np.concatenate([hers.hull, hers.values])
+def _moved(bound_runs: BoundRuns, place: int, by: float) -> tuple[Float, Float]:
+    both = np.concatenate([bound_runs.hull, bound_runs.values])
     both[place] += by
     return both[: len(HULL_PARAMETERS)], both[len(HULL_PARAMETERS) :]
 
 
-def _log_likelihood(hers: BoundRuns, place: int, by: float) -> float:
+def _log_likelihood(bound_runs: BoundRuns, place: int, by: float) -> float:
     """Return that of the manoeuvres that the set was fitted to; of all where none of them is left."""
-    hull, values = _moved(hers, place, by)
-    fitted = [run for run in hers.runs if not run.held_out] or list(hers.runs)
+    hull, values = _moved(bound_runs, place, by)
+    fitted = [run for run in bound_runs.runs if not run.held_out] or list(bound_runs.runs)
     return float(sum(passed(run.filtered, Point(hull, values, run.levels.own)).log_likelihood for run in fitted))
 
 

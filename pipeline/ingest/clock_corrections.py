@@ -61,16 +61,16 @@ class OwnClocks:
         frame = frame.filter(~empty).sort("record", "time_utc_ns", maintain_order=True).select(list(READING_SCHEMA))
         return replace(readings, frame=frame)
 
-    def _moved(self, frame: pl.DataFrame, mine: pl.Expr, key: str, mapped: ChannelMap) -> pl.DataFrame:
+    def _moved(self, frame: pl.DataFrame, of_channel: pl.Expr, key: str, mapped: ChannelMap) -> pl.DataFrame:
         column = CHANNELS[mapped.channel].column
-        own = frame.filter(mine & pl.col(column).is_not_null())
+        own = frame.filter(of_channel & pl.col(column).is_not_null())
         if own.is_empty():
             return frame
         first = self._first.setdefault(key, int(own["time_utc_ns"].min()))  # type: ignore[arg-type]
         since = (pl.col("time_utc_ns") - first).cast(pl.Float64) / mapped.clock_rate - mapped.delay_s * _SECOND_NS
         others = [pl.lit(None, dtype=pl.Float64).alias(c) for c in CHANNEL_COLUMNS if c != column]
         moved = own.with_columns((first + since.round().cast(pl.Int64)).alias("time_utc_ns"), *others)
-        left = frame.with_columns(pl.when(mine).then(None).otherwise(pl.col(column)).alias(column))
+        left = frame.with_columns(pl.when(of_channel).then(None).otherwise(pl.col(column)).alias(column))
         return pl.concat([left, moved])
 
 

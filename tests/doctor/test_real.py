@@ -52,5 +52,5 @@ def test_honest_logs_are_clean(ship: str) -> None:
 
     if not (SHARED / "trials").is_dir():
         pytest.skip(f"the trial logs in {SHARED} are not here")
-    hers = next(one for one in fleet(SHARED) if one.name == ship)
-    assert examined(hers.logs[0], read_profiles(hers.profiles)).content["verdict"] == "clean"
+    found = next(one for one in fleet(SHARED) if one.name == ship)
+    assert examined(found.logs[0], read_profiles(found.profiles)).content["verdict"] == "clean"

@@ -88,8 +88,8 @@ def test_nothing_that_was_measured_is_left_in_any_version(warehouse: Warehouse) 
     assert [one for one in verify(warehouse) if one.table not in {"diagnoses", "aliases"}] == []
     (gone,) = logs.removed(warehouse)
     assert gone.removed == "purged: the charterer's contract"
-    hers = [one for one in parameter_sets.get_all(warehouse, "mariner") if one.log_ids == (other.log_id,)]
-    assert hers and {rerun(warehouse, one.parameter_set_id).verdict for one in hers} == {"bit-identical"}
+    of_log = [one for one in parameter_sets.get_all(warehouse, "mariner") if one.log_ids == (other.log_id,)]
+    assert of_log and {rerun(warehouse, one.parameter_set_id).verdict for one in of_log} == {"bit-identical"}
     assert not reprocess_vessel(warehouse, "mariner").failures
     standing = parameter_sets.get_all(warehouse, "mariner", history.standing(warehouse, "mariner"))
     assert standing and all(one.log_ids == (other.log_id,) for one in standing)

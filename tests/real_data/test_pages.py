@@ -16,9 +16,9 @@ def test_what_the_pond_s_ship_lacks_is_added_and_the_error_falls(browser: Any, p
     place = copytree(pond.warehouse.uri, tmp_path / "w")
     for server in served(place, tmp_path / "state"):
         tab = opened(browser, server)
-        hers = f"{server.base}/v/{pond.ship.name}"
+        vessel_page = f"{server.base}/v/{pond.ship.name}"
         tab.goto(server.start)
-        tab.goto(hers)
+        tab.goto(vessel_page)
         tab.click("button:has-text('Diagnose')")
         tab.wait_for_url("**/diagnoses/dx-**")
         found = tab.url
@@ -46,7 +46,7 @@ def test_what_the_pond_s_ship_lacks_is_added_and_the_error_falls(browser: Any, p
         tab.wait_for_url("**segment=seg-**")
         tab.click("button:has-text('Explain it')")
         tab.wait_for_selector(".verdict")
-        tab.goto(f"{hers}/ladder")
+        tab.goto(f"{vessel_page}/ladder")
         tab.click("button:has-text('Undo')")
         tab.wait_for_selector("main:has(th:has-text('wind force')):not(:has(th:has-text('cross flow drag')))")
         assert [rung["added"] for rung in server.json(f"/v/{pond.ship.name}/ladder.json")] == [

@@ -252,8 +252,8 @@ def test_an_earlier_warehouse_is_brought_forward_in_a_bucket(
     assert said[0] == "readings: 2 ingests have the same rows as before."
     assert "readings: 1 vessel has the same rows as before." in said[1:] and len(before) == 2
     table = delta.open_table(warehouse, "readings")
-    hers = f"/vessel_key={vessel_key('ferry')}/month=2025-05/"
-    assert table is not None and all(hers in uri for uri in table.file_uris())
+    partition = f"/vessel_key={vessel_key('ferry')}/month=2025-05/"
+    assert table is not None and all(partition in uri for uri in table.file_uris())
     assert verify(warehouse) == [] and warehouse.marker() == Marker(LAYOUT)
     assert [readings.read(warehouse, row.ingest_id).height for row in logs.current(warehouse)] == [
         count for count, _, _ in before.values()

@@ -25,7 +25,7 @@ def test_finding_again_replaces(warehouse: Warehouse) -> None:
     early = segment("aurora", one.log_id, one.ingest_id)
     other = segment("aurora", two.log_id, two.ingest_id, START_NS + 5)
     found = {one.ingest_id: [late, early], two.ingest_id: [other]}
-    assert segments.replace(warehouse, {("aurora", ingest): hers for ingest, hers in found.items()}) == tuple(
+    assert segments.replace(warehouse, {("aurora", ingest): rows for ingest, rows in found.items()}) == tuple(
         sorted(found)
     )
     assert [s.segment_id for s in segments.current(warehouse, "aurora")] == [s.segment_id for s in (early, other, late)]

@@ -60,8 +60,8 @@ def check_names(place: Path) -> None:
     }
     for part in parts - allowed - tables:
         hexadecimal = set(part.split("=")[-1].removesuffix(".json")) <= set("0123456789abcdef")
-        hers = re.fullmatch(r"vessel_key=[a-z0-9]+(-[a-z0-9]+)*-[0-9a-f]{8}", part)
-        assert hexadecimal or hers or part.startswith(("part-", "month=")) or part[:20].isdigit(), part
+        of_vessel = re.fullmatch(r"vessel_key=[a-z0-9]+(-[a-z0-9]+)*-[0-9a-f]{8}", part)
+        assert hexadecimal or of_vessel or part.startswith(("part-", "month=")) or part[:20].isdigit(), part
 
 
 @pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))

@@ -96,8 +96,10 @@ def _one_current(warehouse: Warehouse) -> None:
     with delta.ensured(warehouse, "aliases") as table:
         chosen = {row["vessel"]: row for alias in reversed(_BEFORE_CURRENT) for row in pointed if row["alias"] == alias}
         rows = [{**row, "alias": aliases.CURRENT} for row in chosen.values()]
-        hers = one_of("vessel_key", [row["vessel_key"] for row in rows])
-        delta.replace(table, "aliases", rows, f"{hers} AND {one_of('alias', (*_BEFORE_CURRENT, aliases.CURRENT))}")
+        of_vessels = one_of("vessel_key", [row["vessel_key"] for row in rows])
+        delta.replace(
+            table, "aliases", rows, f"{of_vessels} AND {one_of('alias', (*_BEFORE_CURRENT, aliases.CURRENT))}"
+        )
 
 
 def _pointed(warehouse: Warehouse) -> list[dict[str, Any]]:

@@ -89,7 +89,7 @@ def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI
 
 
 def _serve_pages(app: FastAPI, desk: Desk) -> None:
-    def hers(request: Request) -> str:
+    def vessel_of(request: Request) -> str:
         return vessel_at(desk.warehouse, request.path_params["vessel"])
 
     def serve(
@@ -105,8 +105,8 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
     ) -> None:
         serve(
             f"/v/{{vessel}}/{place}",
-            lambda r: gather(desk, hers(r), r.query_params),
-            lambda r: document(desk, hers(r), r.query_params),
+            lambda r: gather(desk, vessel_of(r), r.query_params),
+            lambda r: document(desk, vessel_of(r), r.query_params),
         )
 
     def named(key: str) -> Callable[[Request], str]:
@@ -114,11 +114,13 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
 
     log_id, segment_id, set_id = named("log_id"), named("segment_id"), named("set_id")
     serve("/", lambda r: fleet.gather(desk), lambda r: fleet.document(desk))
-    serve("/v/{vessel}/ladder", lambda r: ladder.gather(desk, hers(r)), lambda r: ladder.document(desk, hers(r)))
-    serve("/v/{vessel}/segments", None, lambda r: vessel.manoeuvres_document(desk, hers(r)))
-    serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(desk, hers(r)))
-    serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(desk, hers(r)))
-    serve("/v/{vessel}", lambda r: vessel.gather(desk, hers(r)), lambda r: vessel.document(desk, hers(r)))
+    serve(
+        "/v/{vessel}/ladder", lambda r: ladder.gather(desk, vessel_of(r)), lambda r: ladder.document(desk, vessel_of(r))
+    )
+    serve("/v/{vessel}/segments", None, lambda r: vessel.manoeuvres_document(desk, vessel_of(r)))
+    serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(desk, vessel_of(r)))
+    serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(desk, vessel_of(r)))
+    serve("/v/{vessel}", lambda r: vessel.gather(desk, vessel_of(r)), lambda r: vessel.document(desk, vessel_of(r)))
     for place, page in (
         ("model", model),
         ("predict", predict),

@@ -104,21 +104,21 @@ def _own_lag(log: Log, heading: Series, speed: float) -> float:
 
 def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
     ninety = np.pi / 2
-    hers = [
+    faults = [
         Fault("sign", ("heading",)),
         Fault("offset", ("heading",), ninety, "counted anticlockwise from east", simplicity=2),
         *unit_faults(("heading",), "rad"),
     ]
     if kind == "course":
         course = (channels[1],)
-        hers += [
+        faults += [
             Fault("sign", course),
             Fault("offset", course, ninety, "counted anticlockwise from east", simplicity=2),
             *unit_faults(course, "rad"),
         ]
     elif kind == "track":
-        hers += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
+        faults += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
     else:
-        hers += [Fault("frame", channels, name=f"{'body' if kind == 'earth' else 'earth'}-fixed")]
-        hers += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
-    return tuple(hers)
+        faults += [Fault("frame", channels, name=f"{'body' if kind == 'earth' else 'earth'}-fixed")]
+        faults += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
+    return tuple(faults)

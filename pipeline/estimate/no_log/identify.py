@@ -140,8 +140,8 @@ def identify_without_log(
         ]
     result = _combined(estimates, solution, own, rounds, converged=converged, no_log=known)
     # in still water the speed over ground along the bow is the speed, whatever the trial speed
-    ours = () if spec.current == "none" else notes
-    return replace(result, warnings=(*result.warnings, *ours, *left_out))
+    current_notes = () if spec.current == "none" else notes
+    return replace(result, warnings=(*result.warnings, *current_notes, *left_out))
 
 
 def _first_fits(

@@ -107,8 +107,8 @@ def _carried_variation(frames: Frames, said: dict[str, Said]) -> tuple[Index, Fl
             record = said[name].record[given]
             address = frames.address[record]
             most = int(np.bincount(address).argmax())
-            mine = address == most
-            return record[mine], value[given][mine], frames.names[most]
+            at_address = address == most
+            return record[at_address], value[given][at_address], frames.names[most]
     return None
 
 
@@ -133,13 +133,13 @@ def both_rudders(frames: Frames, said: dict[str, Said]) -> list[str]:
     port, filled = angle.number() * _DEGREE, angle.there() & status.is_one_of(("A",))
     address = frames.address[rsa.record]
     for code in np.unique(address[filled]):
-        mine = address == code
-        use, note = _judge(starboard, there & mine, port, filled & mine)
+        at_address = address == code
+        use, note = _judge(starboard, there & at_address, port, filled & at_address)
         notes.append(f"{frames.names[code]}: {note}")
         if use:
-            both = mine & there & filled
+            both = at_address & there & filled
             starboard[both] = 0.5 * (starboard[both] + port[both])
-            alone = mine & filled & ~there
+            alone = at_address & filled & ~there
             starboard[alone], there[alone] = port[alone], True
             rsa.reason[alone & (rsa.reason == CODE[Reason.VOID])] = 0
     return notes

@@ -59,8 +59,8 @@ def decode(data: bytes, corrections: Corrections = _NONE, variation_deg: float |
             put = there & (sentences.reason == 0)
             for address, (factor, offset) in corrections.get(channel, {}).items():
                 if address in frames.names:
-                    mine = frames.address[sentences.record] == frames.names.index(address)
-                    value = np.where(mine, value * factor + offset, value)
+                    at_address = frames.address[sentences.record] == frames.names.index(address)
+                    value = np.where(at_address, value * factor + offset, value)
             channels.setdefault(channel, Values.empty(n)).put(sentences.record[put], value[put])
     clock = clock_of(frames, said)
     unread = (frames.reason == CODE[Reason.CHECKSUM]) | (frames.reason == CODE[Reason.MALFORMED])

@@ -180,11 +180,11 @@ def _read_transducers(said: Said) -> None:
         value, label = fields.at(k + 1), fields.at(k + 3)
         number, filled = value.number() * _DEGREE, value.there()
         for name, channel in XDR_ANGLES.items():
-            mine = angle & label.is_one_of((name,))
-            named |= mine
-            mine &= filled
+            labelled = angle & label.is_one_of((name,))
+            named |= labelled
+            labelled &= filled
             got, there = said.values[channel]
-            got[mine], there[mine] = number[mine], True
+            got[labelled], there[labelled] = number[labelled], True
     said.reason[(said.reason == 0) & ~named] = CODE[Reason.NO_CHANNEL]
 
 

@@ -55,21 +55,21 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
 
 def test_every_page_about_a_model_is_accessible_and_fits(browser: Any, with_lag: Server, scheme: str, width: int):
     tab = opened(browser, with_lag, color_scheme=scheme, viewport={"width": width, "height": 900})
-    hers = f"/v/{VESSEL}"
-    plain, added = (rung["parameter_set_id"] for rung in with_lag.json(f"{hers}/ladder.json"))
-    segment = with_lag.json(f"{hers}/segments.json")[0]["segment_id"]
+    vessel_page = f"/v/{VESSEL}"
+    plain, added = (rung["parameter_set_id"] for rung in with_lag.json(f"{vessel_page}/ladder.json"))
+    segment = with_lag.json(f"{vessel_page}/segments.json")[0]["segment_id"]
     tab.goto(with_lag.start)
     for path in (
-        hers,
-        f"{hers}/ladder",
-        f"{hers}/model",
+        vessel_page,
+        f"{vessel_page}/ladder",
+        f"{vessel_page}/model",
         f"/sets/{added}",
         f"/compare?a={plain}&b={added}",
         f"/segments/{segment}?beside={plain}",
     ):
         tab.goto(with_lag.base + path)
         accessible(tab)
-    tab.goto(with_lag.base + hers)
+    tab.goto(with_lag.base + vessel_page)
     tab.click("main a[href^='/diagnoses/'] >> nth=0")
     tab.wait_for_url("**/diagnoses/dx-**")
     accessible(tab)
@@ -79,11 +79,11 @@ def test_every_page_about_a_model_is_accessible_and_fits(browser: Any, with_lag:
         ("what-if", "parameter=rudder_lag.tau"),
         ("next-trial", "parameter=b2"),
     ):
-        tab.goto(f"{with_lag.base}{hers}/{place}?{fields}")
+        tab.goto(f"{with_lag.base}{vessel_page}/{place}?{fields}")
         accessible(tab)  # before anything is asked for
         tab.locator("main form.job button").first.click()
         tab.wait_for_url("**/jobs/**")
         accessible(tab)
-        tab.wait_for_url(re.compile(f"{hers}/{place}[?]"))
+        tab.wait_for_url(re.compile(f"{vessel_page}/{place}[?]"))
         accessible(tab)
     assert with_lag.complaints == []

@@ -78,8 +78,8 @@ def test_a_new_rudder_is_a_band_and_what_the_command_prints(opened: Open, tmp_pa
     assert page.text.count(">yes</td>") == 2 and "What would be seen" in page.text
     assert "do not agree within their standard errors" in page.text
     assert ">note 1</text>" in page.text and "docked &amp; &lt;b&gt;painted&lt;/b&gt;" in page.text
-    hers = client.get(f"/v/{VESSEL}").text
-    assert hers.count('class="changed moved"') == 2 and "What changed" in hers
+    vessel_page = client.get(f"/v/{VESSEL}").text
+    assert vessel_page.count('class="changed moved"') == 2 and "What changed" in vessel_page
 
 
 def test_three_occasions_are_too_few_and_it_says_so(opened: Open) -> None:

@@ -46,13 +46,13 @@ def _keep_predictions(
     from kempf.workbench.web.data.predictions import HORIZONS, keep, key_of
 
     rests_on = fleet_state(warehouse, [vessel])[vessel]
-    hers = bound(warehouse, vessel, name, progress)
+    bound_runs = bound(warehouse, vessel, name, progress)
     every = dict.fromkeys((*([asked] if asked else []), *(horizon_of(short).name for short, _ in HORIZONS)))
     for horizon in every:
-        if horizon == "legs" and hers.legs is None:
+        if horizon == "legs" and bound_runs.legs is None:
             continue  # it is the free run
         try:
-            keep(state, key_of(rests_on, name, horizon), compared(hers, horizon_of(horizon), progress))
+            keep(state, key_of(rests_on, name, horizon), compared(bound_runs, horizon_of(horizon), progress))
         except DataRejected:
             if horizon == asked:
                 raise

@@ -31,18 +31,18 @@ def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None
         manoeuvre for manoeuvre in segments.found_in(desk.warehouse, row.vessel) if manoeuvre.ingest_id == row.ingest_id
     ]
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
-    hers = notes.of_vessel(desk.warehouse, row.vessel)
+    vessel_notes = notes.of_vessel(desk.warehouse, row.vessel)
     shown = log_document(desk.warehouse, row)
     content = {
         "log": shown,
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
-        "remarks": [note.show() for note in hers if note.subject_id == row.log_id],
+        "remarks": [note.show() for note in vessel_notes if note.subject_id == row.log_id],
         "manoeuvres": [manoeuvre.show(row.file_name) for manoeuvre in manoeuvres],
         "spans": [
             *(span_of(manoeuvre) for manoeuvre in manoeuvres),
             *spans_of_lost(gone, row.start_utc_ns, row.end_utc_ns),
-            *spans_of_notes(hers, row.end_utc_ns),
+            *spans_of_notes(vessel_notes, row.end_utc_ns),
         ],
         "lost": lost_as_json(gone),
         "track": draw_track(channels, [(manoeuvre.start_utc_ns, manoeuvre.end_utc_ns) for manoeuvre in manoeuvres]),

@@ -46,7 +46,7 @@ def gather(desk: Desk, segment_id: str, fields: Mapping[str, str]) -> Page:
     beyond = int(_MARGIN * (segment.end_utc_ns - segment.start_utc_ns))
     first, last = max(segment.start_utc_ns - beyond, row.start_utc_ns), min(segment.end_utc_ns + beyond, row.end_utc_ns)
     begin, end = window(fields.get("from"), fields.get("to"), first, last)
-    hers = notes.of_vessel(desk.warehouse, row.vessel)
+    vessel_notes = notes.of_vessel(desk.warehouse, row.vessel)
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
     compared = segment.is_fitted and segment.excluded is None
     current = compared and aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
@@ -54,13 +54,13 @@ def gather(desk: Desk, segment_id: str, fields: Mapping[str, str]) -> Page:
         "one": shown,
         "log_id": row.log_id,
         "channels": offered(desk.channels.of(row.ingest_id)),
-        "spans": [span_of(segment), *spans_of_lost(gone, first, last), *spans_of_notes(hers, last)],
+        "spans": [span_of(segment), *spans_of_lost(gone, first, last), *spans_of_notes(vessel_notes, last)],
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
         "current": current,
         "predicted": None,
         "stretch": None,
-        "notes": [note.show() for note in hers if note.subject_id == segment.segment_id],
+        "notes": [note.show() for note in vessel_notes if note.subject_id == segment.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }
