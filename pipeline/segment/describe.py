@@ -10,7 +10,7 @@ from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.constancy import speed_constancy
 from kempf.pipeline.segment.local_fit import value_and_rate
 from kempf.pipeline.segment.measured import Signals, said_of_gap
-from kempf.pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, measured_angles, nominal_angle
+from kempf.pipeline.segment.nominal import measured_angles, nominal_angles
 from kempf.pipeline.segment.phases import leg_phases, turning_point
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.switching import Chain, Switching
@@ -27,6 +27,8 @@ from kempf.pipeline.segment.zigzag import (
 
 #: Change of speed after the second execute from which it is called not constant, percent.
 _SPEED_TREND_PERCENT = 10.0
+#: A speed that falls by so much of its mean along a straight line comes to nothing before the end, percent.
+_STOPS_PERCENT = 200.0
 
 
 @dataclass(frozen=True)
@@ -132,9 +134,7 @@ def _due(signals: Signals, switching: Switching, side: int, from_s: float, to_s:
 
 def _nominal(chain: Chain, switching: Switching) -> tuple[float, float]:
     """Return psi0 and delta0 as they were most likely ordered, deg."""
-    psi0, delta0, late = measured_angles(chain, switching)
-    ordered = nominal_angle(delta0, 0.0, RUDDER_TOLERANCE)
-    return nominal_angle(psi0, late, HEADING_TOLERANCE, expected_deg=ordered), ordered
+    return nominal_angles(*measured_angles(chain, switching))
 
 
 def _executes(signals: Signals, chain: Chain, switching: Switching) -> tuple[Execute, ...]:
@@ -243,7 +243,13 @@ def _quality(
         "unknown": "The approach is not there: the first leg begins before the log or after another manoeuvre.",
     }
     shown = [reasons[switching.start]] if switching.start in reasons else []
-    if speed is not None and not abs(speed.trend_percent) <= _SPEED_TREND_PERCENT:
+    # a ship does not lose all of her speed in a zigzag; nan: the mean is nothing
+    if speed is not None and not speed.trend_percent > -_STOPS_PERCENT:
+        shown.append(
+            f"The speed after the second execute is {speed.mean_m_s:.2g} m/s in the mean and falls to nothing: does "
+            "the log stop?"
+        )
+    elif speed is not None and abs(speed.trend_percent) > _SPEED_TREND_PERCENT:
         shown.append(f"The speed changed by {speed.trend_percent:.0f} % after the second execute.")
     return Quality(
         n_legs=switching.last - switching.first + 1,

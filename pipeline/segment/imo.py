@@ -112,7 +112,7 @@ def _obstacle(zigzag: Zigzag, ship: Particulars, measured_m_s: float | None) -> 
         return "the length of the ship is not known"
     if ship.too_short:
         return ship.too_short
-    if measured_m_s and ship.too_slow(measured_m_s):
+    if measured_m_s is not None and ship.too_slow(measured_m_s):
         return (
             f"the approach speed of {measured_m_s:.1f} m/s is below {100 * SLOWEST_SHARE:.0f} % of the trial speed "
             f"{ship.trial_speed_m_s:g} m/s"

@@ -83,6 +83,37 @@ def nominal_angle(measured_deg: float, late_deg: float, relative: float, expecte
     return float(round(measured_deg))
 
 
+def nominal_angles(psi0_deg: float, delta0_deg: float, late_deg: float) -> tuple[float, float]:
+    """Return the pair of angles that was most likely ordered.
+
+    A compass shows psi0 far better than a feedback shows the order of the rudder, which is often some per cent off: a
+    customary psi0 is not given up for a delta0 beside it, and delta0 is the same angle as far as it can be.
+
+    Parameters
+    ----------
+    psi0_deg, delta0_deg, late_deg : float
+        Of `measured_angles`.
+
+    Returns
+    -------
+    tuple of float
+        psi0 and delta0, deg.
+
+    Examples
+    --------
+    >>> nominal_angles(20.8, 21.4, 0.9), nominal_angles(10.4, 20.1, 0.9), nominal_angles(12.2, 12.1, 0.5)
+    ((20.0, 20.0), (10.0, 20.0), (12.0, 12.0))
+    """
+    rudder = nominal_angle(delta0_deg, 0.0, RUDDER_TOLERANCE)
+    expected = rudder if rudder in CUSTOMARY_DEG else None
+    heading = nominal_angle(psi0_deg, late_deg, HEADING_TOLERANCE, expected)
+    if heading not in CUSTOMARY_DEG:
+        return nominal_angle(psi0_deg, late_deg, HEADING_TOLERANCE, rudder), rudder
+    if rudder not in CUSTOMARY_DEG and abs(delta0_deg - heading) <= 2.0 * RUDDER_TOLERANCE * heading:
+        return heading, heading
+    return heading, rudder
+
+
 def is_customary(measured_deg: float, late_deg: float, relative: float) -> bool:
     """Whether the measured angle is one of the customary ones, with the tolerances of `nominal_angle`.
 

@@ -37,7 +37,7 @@ def test_a_sound_log_is_clean_and_every_channel_tested() -> None:
         "heading_track_clock",
         "legs_track",
     }
-    assert len(CHECKS) == 9
+    assert len(CHECKS) == 10
 
 
 FAULTS = {
@@ -206,3 +206,46 @@ def test_every_unit_has_its_inverse() -> None:
 def test_it_says_the_same_twice() -> None:
     log = changed(closed_form_ship.log(), "heading", -1.0)
     assert [o.figures for some in ask(log) for o in some] == [o.figures for some in ask(log) for o in some]
+
+
+@pytest.mark.parametrize("degrees", [8.0, -30.0])
+def test_a_leap_of_the_compass_is_named_and_taken_out(degrees: float) -> None:
+    log = closed_form_ship.log()
+    heading = log.series["heading"]
+    behind = np.arange(len(heading)) >= 700
+    spoilt = log.with_series({"heading": Series(heading.time_utc_ns, heading.value + np.deg2rad(degrees) * behind)})
+    (finding,) = examine(spoilt).findings
+    (fault,) = finding.faults
+    assert (fault.kind, fault.channels, setting(fault)) == ("leap", ("heading",), "")
+    assert np.rad2deg(fault.value) == pytest.approx(degrees, abs=0.5)
+    assert abs(fault.start_utc_ns - int(heading.time_utc_ns[700])) <= 2 * SECOND_NS
+    assert examine(fault.corrected(spoilt)).findings == ()
+
+
+@pytest.mark.parametrize("shown", [0.0, 5.43219])
+def test_a_log_that_stops_or_repeats_itself_is_stuck(shown: float) -> None:
+    log = closed_form_ship.log()
+    water = log.series["speed_through_water"]
+    still = (np.arange(len(water)) > 800) & (np.arange(len(water)) < 1900)
+    spoilt = log.with_series({"speed_through_water": Series(water.time_utc_ns, np.where(still, shown, water.value))})
+    (finding,) = examine(spoilt).findings
+    assert [(f.kind, f.channels) for f in finding.faults] == [("stuck", ("speed_through_water",))]
+    assert "constant" in finding.evidence[0].words
+
+
+def test_a_coarse_log_that_repeats_itself_on_a_straight_course_is_sound() -> None:
+    log = closed_form_ship.log()
+    water = log.series["speed_through_water"]
+    coarse = np.round(water.value / 0.5) * 0.5
+    found = examine(log.with_series({"speed_through_water": Series(water.time_utc_ns, coarse)}))
+    assert not any("standstill" in o.check for o in found.outcomes if o.state == "disagree")
+
+
+def test_both_speeds_in_one_wrong_unit_are_one_fault() -> None:
+    spoilt = changed(
+        changed(closed_form_ship.log(), "speed_over_ground", 3600 / 1852), "speed_through_water", 3600 / 1852
+    )
+    (finding,) = examine(spoilt).findings
+    assert [(f.kind, f.channels, f.name) for f in finding.faults] == [
+        ("unit", ("speed_over_ground", "speed_through_water"), "kn taken for m/s")
+    ]

@@ -51,6 +51,10 @@ def refused(log: Instruments, end_ns: int = END) -> DataRejected:
     return caught.value
 
 
+def emptied(x: np.ndarray) -> np.ndarray:
+    return np.where(np.arange(x.size) > 0.8 * x.size, 0.0, x)
+
+
 REFUSED: list[tuple[str, Instruments, str, str]] = [
     ("degrees of rudder for radians", valued("rudder_angle", times(1 / DEG)), "rudder_unit", "`unit: deg`"),
     ("radians of rudder for degrees", valued("rudder_angle", times(DEG)), "rudder_unit", "`unit: rad`"),
@@ -66,6 +70,14 @@ REFUSED: list[tuple[str, Instruments, str, str]] = [
     ("compass dead", stuck("heading"), "heading_stuck", "compass"),
     ("compass dead, no rate", stuck("heading", without(LOG, "yaw_rate")), "heading_stuck", "compass"),
     ("compass hangs for 40 s", held("heading", 100.0, 140.0), "heading_stuck", "before or after"),
+    (
+        "compass leaps",
+        valued("heading", lambda x: x + 0.4 * (np.arange(x.size) > 0.5 * x.size)),
+        "heading_leap",
+        "before",
+    ),
+    ("log hangs", held("speed_through_water", 100.0, 300.0), "speed_stuck", "Map no speed_through_water"),
+    ("log stops", valued("speed_through_water", emptied), "speed_stuck", "Map no speed_through_water"),
     ("astern", valued("speed_through_water", times(-1.0)), "speed_negative", "ahead"),
     ("log in knots for m/s", valued("speed_through_water", times(1 / KNOT)), "speed_unit", "`unit: kn`"),
     ("log in m/s for knots", valued("speed_through_water", times(KNOT)), "speed_unit", "`unit: m/s`"),
@@ -86,7 +98,7 @@ def test_bad_input_is_refused_with_its_cure(log: Instruments, code: str, cure: s
 
 
 def stops(x: np.ndarray) -> np.ndarray:
-    return np.where(np.arange(x.size) > 0.8 * x.size, 0.0, x)
+    return np.where(np.arange(x.size) > 0.8 * x.size, 1e-3 * np.sin(np.arange(x.size)), x)
 
 
 def test_a_ship_that_stops_is_refused() -> None:

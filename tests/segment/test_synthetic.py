@@ -292,3 +292,17 @@ def test_four_legs_from_an_approach_that_was_not_steady_are_kept_and_labelled(
     assert np.max(late[1:]) < 0.5
     # a rudder that comes amidships for a moment and goes on is one movement
     assert late[0] < amidships_s + 0.5
+
+
+@pytest.mark.parametrize("factor", [1.05, 1.08, 0.93])
+def test_a_rudder_that_reads_some_per_cent_off_changes_no_nominal_heading(factor: float) -> None:
+    vessel = Ship()
+    vessel.wait(0.0, 100.0)
+    vessel.zigzag(20.0, 20.0, 1, 6)
+    heading, rudder = measure(vessel, Instruments())
+    true = find_manoeuvres(heading, rudder)[0]
+    found = find_manoeuvres(heading, Series(rudder.time_utc_ns, factor * rudder.value))[0]
+    assert (found.psi0_deg, found.delta0_deg) == (20.0, 20.0)
+    assert found.delta0_measured_deg == pytest.approx(factor * true.delta0_measured_deg, rel=1e-3)
+    pairs = zip(found.overshoots, true.overshoots, strict=True)
+    assert all(one.beyond_nominal_deg == pytest.approx(other.beyond_nominal_deg, abs=0.1) for one, other in pairs)

@@ -82,7 +82,7 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
         From `entries`.
     log_format : {"delimited", "mcap", "nmea"}
     """
-    if fault.kind == "stuck" or any(channel not in known for channel in fault.channels):
+    if fault.kind in ("stuck", "leap") or any(channel not in known for channel in fault.channels):
         return ()
     if fault.kind in ("swap", "frame"):
         if log_format == "nmea":

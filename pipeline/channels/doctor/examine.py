@@ -9,6 +9,7 @@ from typing import Protocol
 from kempf.pipeline.channels.doctor import (
     heading_course,
     heading_rate,
+    leap,
     misalignment,
     plausible,
     rudder_order,
@@ -45,6 +46,7 @@ CHECKS: tuple[Check, ...] = (
     rudder_turn.examine,
     rudder_order.examine,
     standstill.examine,
+    leap.examine,
 )
 #: Faults that are corrected one after the other, at most.
 _MOST_FAULTS = 4

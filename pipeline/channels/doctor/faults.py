@@ -12,7 +12,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
-Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"]
+Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck", "leap"]
 
 #: What a log may hold under the name of the canonical unit: the factor on the reading that corrects it, by name.
 UNITS: dict[str, dict[str, float]] = {
@@ -44,13 +44,13 @@ _SELDOM = ("km/h taken for kn", "kn taken for km/h")
 class Fault:
     """One fault of one instrument."""
 
-    #: One of {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"}.
+    #: One of {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck", "leap"}.
     kind: Kind
     #: That share the fault.
     channels: tuple[str, ...]
     #: What is done about it: the factor for a unit or a scale, the angle that is added (rad) for an offset, the seconds
     #: that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale, the seconds
-    #: for which a channel is stuck.
+    #: for which a channel is stuck, the angle (rad) by which it leaps.
     value: float = 1.0
     #: Which fault of the kind, such as ``kn taken for m/s``.
     name: str = ""
@@ -60,7 +60,7 @@ class Fault:
     spread: str = "1 s.e."
     #: Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
     simplicity: int = 1
-    #: When a channel that is stuck begins to be, UTC ns.
+    #: When a channel that is stuck begins to be, or leaps, UTC ns.
     start_utc_ns: int = 0
 
     @property
@@ -143,6 +143,12 @@ def _stuck(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
     return {name: Series(time[kept], own[name].value[kept]) if np.count_nonzero(kept) > 1 else None}
 
 
+def _leap(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    (name,) = fault.channels
+    behind = own[name].time_utc_ns >= fault.start_utc_ns
+    return _each(own, {name: own[name].value - np.where(behind, fault.value, 0.0)})
+
+
 _CORRECTIONS = {
     "sign": _sign,
     "unit": _unit,
@@ -153,4 +159,5 @@ _CORRECTIONS = {
     "latency": _latency,
     "clock_scale": _clock_scale,
     "stuck": _stuck,
+    "leap": _leap,
 }

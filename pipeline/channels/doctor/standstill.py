@@ -1,4 +1,4 @@
-"""A heading or yaw rate that repeats one reading while the ship turns."""
+"""A heading or yaw rate that repeats one reading while the ship turns, a log while her speed over ground changes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral
-from kempf.pipeline.channels.doctor.motion import does_not_move
+from kempf.pipeline.channels.doctor.motion import does_not_move, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import reach
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 
 #: A channel stands still when it repeats itself so long, in so many readings, while the ship turns so far.
 _LEAST_S, _LEAST_READINGS, _TURN_DEG = 10.0, 10, 5.0
@@ -24,16 +24,27 @@ _BIAS_RAD_S = float(np.deg2rad(0.05))
 _MOST = 50
 #: A heading that swings less than this in the whole log while the ship swings five times as far is noise.
 _DEAD_RAD, _UNLIKE = float(np.deg2rad(1.0)), 0.5
+#: A log that repeats itself for so long is looked at, s; the speed over ground is compared in means over so long, s,
+#: and so much of it may change without the log, as a share of it, one standard error of that, in streams' deviations.
+_LOG_S, _MEAN_S, _CHANGE, _CHANGE_STD, _STREAMS = 60.0, 10.0, 0.1, 0.02, 2.0
+#: A log shows nothing below this share of the speed over ground; it is a fine one with steps below that one, and may
+#: then not stand still while she turns farther than so many degrees.
+_NOTHING, _FINE, _LOG_TURN_DEG = 0.02, 0.002, 20.0
 
 
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
-    """Find the times at which heading or yaw rate stand still.
+    """Find the times at which heading, yaw rate or the speed through the water stand still.
 
     Returns
     -------
     list of Outcome
-        ``heading_standstill``, compared with the yaw rate, else with the course; ``yaw_rate_standstill``.
+        ``heading_standstill``, compared with the yaw rate, else with the course; ``yaw_rate_standstill``;
+        ``speed_through_water_standstill``, compared with the speed over ground.
     """
+    return [*_of_turning(log), *_of_water_speed(log)]
+
+
+def _of_turning(log: Log) -> list[Outcome]:
     heading, rate, velocity = log.series.get("heading"), log.series.get("yaw_rate"), log.velocity("course")
     if heading is None or (rate is None and velocity is None):
         return []
@@ -71,6 +82,65 @@ def _judged(channel: str, reference: str, standstill: tuple[Series, float] | Non
     )
     fault = Fault("stuck", (channel,), (end - start) / SECOND_NS, start_utc_ns=start)
     return Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))
+
+
+def _of_water_speed(log: Log) -> list[Outcome]:
+    water, ground = log.series.get("speed_through_water"), log.series.get("speed_over_ground")
+    if water is None or ground is None:
+        return []
+    name, channels = "speed_through_water_standstill", ("speed_through_water", "speed_over_ground")
+    if does_not_move(log):
+        return [untestable(name, channels, STILL)]
+    found = [(still, *missed) for still in _repeats(water, None) if (missed := _missed(log, still, ground)) is not None]
+    worst = max(found, key=lambda one: one[1].outside, default=None)
+    if worst is None or worst[1].state != "disagree":
+        words = "speed_through_water is never constant while the ship's speed changes"
+        return [Outcome(name, channels, "agree", words, alone=True)]
+    still, figure, meanwhile = worst
+    start, end = int(still.time_utc_ns[0]), int(still.time_utc_ns[-1])
+    long = (end - start) / SECOND_NS
+    words = f"speed_through_water is constant, {still.value[0]:.3g} m/s, for {long:.0f} s, during which {meanwhile}"
+    fault = Fault("stuck", ("speed_through_water",), long, start_utc_ns=start)
+    return [Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))]
+
+
+def _missed(log: Log, still: Series, ground: Series) -> tuple[Figure, str] | None:
+    """Return what the speed over ground does beyond a stream while a log repeats itself, and that in words."""
+    start, end = int(still.time_utc_ns[0]), int(still.time_utc_ns[-1])
+    speed = _means(ground.between(start, end))
+    if speed.size < 2 or end - start <= _LOG_S * SECOND_NS:
+        return None
+    usual = float(np.median(speed))
+    stream = _STREAMS * stream_std(log, quantile(np.abs(ground.value), 0.9))
+    if abs(float(still.value[0])) < _NOTHING * usual:
+        figure = Figure(
+            "speed over ground while the log shows none", usual, _CHANGE_STD * usual, 0.0, 2.0 * stream, "m/s"
+        )
+        return figure, f"the speed over ground is {usual:.3g} m/s"
+    heading = log.series["heading"].between(start, end).value if "heading" in log.series else np.zeros(0)
+    swing = reach(heading) if heading.size else 1.0
+    steps = np.abs(np.diff(log.series["speed_through_water"].value))
+    rounding = float(np.min(steps[steps > 0.0], initial=usual))
+    if rounding < _FINE * usual and heading.size:
+        # a turn costs speed, and no log that shows a thousandth of it misses that
+        turn = Figure("turn while the log is constant", float(np.rad2deg(swing)), 1.0, 0.0, _LOG_TURN_DEG, "deg")
+        return turn, f"the ship turns by {turn.value:.0f} deg"
+    allowed = rounding + _CHANGE * usual + stream * min(swing, 2.0)
+    change = float(np.ptp(speed))
+    figure = Figure(
+        "change of speed over ground while the log is constant", change, _CHANGE_STD * usual, 0.0, allowed, "m/s"
+    )
+    return figure, f"the speed over ground changes by {change:.3g} m/s"
+
+
+def _means(series: Series) -> Float:
+    """Return means of a series over `_MEAN_S` each."""
+    if not len(series):
+        return series.value
+    which = np.floor(series.seconds_since(int(series.time_utc_ns[0])) / _MEAN_S).astype(np.int64)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(which) > 0]))
+    means: Float = np.add.reduceat(series.value, starts) / np.diff(np.append(starts, which.size))
+    return means
 
 
 def _repeats(series: Series, way: Series | None) -> Iterator[Series]:

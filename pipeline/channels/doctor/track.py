@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
@@ -20,6 +22,7 @@ _ASTRAY = 0.15
 _MOST, _OVER, _CLEAR, _FEWEST = 240, 4.0, 30.0, 8
 #: The way within a window, m, at least: noise of a fix that remembers what it was does not show from fix to fix.
 _CLEAR_M = 5.0
+_OVER_GROUND = ("speed_over_ground",)
 #: The log is so many windows long at least.
 _LEAST_WINDOWS = 2.5
 
@@ -117,6 +120,10 @@ def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...]
         *((Fault("swap", ("latitude", "longitude")),) if {"latitude", "longitude"} <= set(channels) else ()),
         Fault("scale", speed, 1.0 / ratio, "scale", std / ratio**2, simplicity=3),
     ]
+    if speed == _OVER_GROUND:
+        # one logger writes both speeds, and in one unit
+        both = unit_faults((*_OVER_GROUND, "speed_through_water"), "m/s")
+        suspects += [replace(fault, simplicity=fault.simplicity + 1) for fault in both]
     return Outcome(name, channels, figure.state, words, (figure,), min(spread + abs(middle), 1.0), tuple(suspects))
 
 

@@ -127,7 +127,9 @@ def _of_clock(names: str, fault: Fault) -> str:
 
 
 _WORDS: dict[str, Callable[[str, Fault], str]] = {
-    "unit": lambda names, fault: f"{names} is in {fault.name.replace(' taken', ', taken', 1)}",
+    "unit": lambda names, fault: (
+        f"{names} {'is' if len(fault.channels) == 1 else 'are'} in {fault.name.replace(' taken', ', taken', 1)}"
+    ),
     "sign": lambda names, _: f"{names} has the wrong sign",
     "swap": lambda names, _: f"{names} are swapped",
     "frame": lambda names, fault: f"{names} are {fault.name} where {_FRAMES[fault.name]}",
@@ -137,6 +139,7 @@ _WORDS: dict[str, Callable[[str, Fault], str]] = {
     ),
     "scale": lambda names, fault: f"{names} has to be multiplied by {fault.value:.4g} ± {fault.std:.1g} (1 s.e.)",
     "stuck": lambda names, _: f"{names} is stuck",
+    "leap": lambda names, fault: f"{names} leaps by {fault.value * 180.0 / pi:+.1f} deg",
     "offset": _of_offset,
     "clock_scale": _of_clock,
 }

@@ -24,6 +24,7 @@ CODES = {
     ("unit", "heading"): "heading_unit",
     ("sign", "heading"): "heading_sign",
     ("stuck", "heading"): "heading_stuck",
+    ("stuck", "speed_through_water"): "speed_stuck",
     ("unit", "yaw_rate"): "yaw_rate_unit",
     ("sign", "yaw_rate"): "yaw_rate_sign",
     ("unit", "rudder_angle"): "rudder_unit",
@@ -33,9 +34,14 @@ CODES = {
 }
 #: a direction turned by more than this has nothing to do with the lateral speed of eq. (18), rad
 FARTHEST_RAD = float(np.deg2rad(45.0))
+#: a heading that leaps by more is no heading of one manoeuvre; by less it is warned of, rad
+_LEAP_RAD = float(np.deg2rad(10.0))
 _NEXT_STEPS = {
     "heading_stuck": "Identification needs a working heading: repair the compass or map another one, and repeat the "
     "manoeuvre; where it is stuck only for a while, identify the part before or after.",
+    "heading_leap": "Identify the part before or after the leap (`kempf segments correct`), or repeat the manoeuvre.",
+    "speed_stuck": "Map no speed_through_water for this log, so that her speed is estimated from the others, or "
+    "identify the part before or after.",
     "course_not_along_heading": "Check unit, sign and offset of heading and course, and whether she went astern{line}.",
     "speed_negative": "Write {line} if she went ahead, or choose a segment ahead.",
 }
@@ -94,6 +100,8 @@ def _refuse(finding: ChannelFinding) -> None:
 def _code(fault: Fault) -> str | None:
     """Return the code of a fault that makes the segment useless, None for one that is only warned of."""
     channel = fault.channels[0]
+    if fault.kind == "leap":
+        return "heading_leap" if abs(fault.value) > _LEAP_RAD else None
     if fault.kind == "offset" and fault.name.startswith("counted anticlockwise") and channel == "heading":
         return "heading_sign"
     code = CODES.get((fault.kind, channel))
