@@ -26,6 +26,7 @@ from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.chain import F, R, V
 from kempf.schemas.errors import NotFound
@@ -188,6 +189,10 @@ def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
         )
     if isinstance(manoeuvre, Spiral):
         return replace(manoeuvre, rudder_rad=rudder)
+    if isinstance(manoeuvre, TurningCircle):
+        # the steady figures are means over the last turn: of as many turns as were sailed
+        turned = radians(abs(float(segment.detail["heading_change_deg"])))
+        return replace(manoeuvre, side=side, rudder_rad=rudder, turn_rad=turned)
     return replace(manoeuvre, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 

@@ -92,6 +92,10 @@ def described(request: SetRequest) -> dict[str, Any]:
     }
 
 
+#: how a warning begins that the channels of a log contradict each other
+CHANNELS_OF = "channels of log"
+
+
 def channel_warnings(origin: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what the channel doctor said of the logs behind a set, as its warnings.
 
@@ -102,7 +106,7 @@ def channel_warnings(origin: Mapping[str, Any]) -> tuple[str, ...]:
     """
     by_log = dict(origin.get("channels") or {})
     return tuple(
-        f"channels of log {log[:12]}: {words}; see `kempf doctor {log[:12]}`"
+        f"{CHANNELS_OF} {log[:12]}: {words}; see `kempf doctor {log[:12]}`"
         for log in sorted(by_log)
         for words in by_log[log]
     )

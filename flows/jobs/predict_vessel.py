@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.parameter_set_of import CHANNELS_OF
 from kempf.flows.jobs.predict_request import PredictRequest, manoeuvre_of, required
 from kempf.flows.jobs.predicted import Predicted, assumed_by, limits_of
 from kempf.flows.jobs.prediction_basis import Basis, basis_of, identified
@@ -32,6 +33,8 @@ class ModelsOfSet:
     models: tuple[Identified, ...]
     #: Of how the others were found, sentences.
     remarks: tuple[str, ...]
+    #: What diagnoses and the channels of the logs say against the set, sentences.
+    against: tuple[str, ...] = ()
 
 
 def predict_vessel(
@@ -67,7 +70,8 @@ def models_of_set(
     speed = request.speed_m_s or basis.approach_m_s
     rivals = rivals_of(warehouse, parameter_set, progress)
     models = tuple(identified(ship_of_set(warehouse, each, speed), basis) for each in (parameter_set, *rivals.sets))
-    return ModelsOfSet(vessel, parameter_set, basis, speed, models, rivals.remarks)
+    against = (*rivals.against, *(w for w in parameter_set.warnings if w.startswith(CHANNELS_OF)))
+    return ModelsOfSet(vessel, parameter_set, basis, speed, models, rivals.remarks, against)
 
 
 def predict_with(
@@ -91,4 +95,5 @@ def predict_with(
         prediction,
         assumed,
         limits_of(prediction, parameter_set),
+        against=set_models.against,
     )

@@ -25,8 +25,8 @@ _TAKEN = {
     "roll": "no heel",
     "shaft_speed": "the shaft turning as on the approach",
 }
-#: a widening from which it is said
-_SAID = 1.05
+#: a widening from which it is said; largest approach over smallest from which they are unlike
+_SAID, _UNLIKE = 1.05, 1.1
 _INSTRUMENTS = {"lateral_speed", "yaw_rate", "heading"}
 
 
@@ -44,6 +44,8 @@ class Predicted:
     limits: tuple[str, ...]
     #: What the intervals were held against; None where that was not done.
     own_zigzags: OwnZigzags | None = None
+    #: What diagnoses and the channels of the logs say against the set, sentences.
+    against: tuple[str, ...] = ()
 
     def show(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
@@ -85,7 +87,7 @@ class Predicted:
             },
             "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
             "assumed": list(self.assumed),
-            "limits": list(self.limits),
+            "limits": [*self.against, *self.limits],
         }
 
 
@@ -93,9 +95,11 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
     """Return what a prediction takes for granted, sentences."""
     sentences = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
-        sentences.append(
-            f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres that were sailed"
-        )
+        approaches = [run.approach_m_s for run in basis.runs.runs]
+        mean = f"approach at {speed:.3g} m/s, the mean of the {len(approaches)} manoeuvres that were sailed"
+        if max(approaches) > _UNLIKE * min(approaches):
+            mean += f", from {min(approaches):.3g} to {max(approaches):.3g} m/s; --speed takes another"
+        sentences.append(mean)
     if basis.particulars.model_scale is not None:
         sentences.append(
             f"full scale by Froude's law, 1:{basis.particulars.model_scale:g}: what the lower Reynolds number does to "

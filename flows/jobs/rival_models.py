@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +10,17 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.standing_model import SEARCH, inputs_of, model_of
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
+from kempf.schemas.enumeration import listed
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import code_version, diagnoses, parameter_sets
 from kempf.warehouse.canonical import canonical_json
+from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
+
+#: Verdicts that leave something.
+_LEFT = ("partly_explained", "unexplained")
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,8 @@ class Rivals:
     sets: tuple[ParameterSet, ...]
     #: What a user should know of how they were found, sentences.
     remarks: tuple[str, ...]
+    #: What the diagnoses say against the given model, sentences.
+    against: tuple[str, ...] = ()
 
 
 def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progress = silent) -> Rivals:
@@ -50,6 +57,7 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
         )
     present = code_version.fingerprint("diagnose")
     candidates = [d for d in candidates if d.code_version == present] or candidates
+    against = _against(candidates, effects)
     alike = [
         tuple(entry["effects"]) for d in candidates for entry in d.content.get("sets", ()) if len(entry["effects"]) > 1
     ]
@@ -62,7 +70,7 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
         if other not in effects
     ]
     if not rivals:
-        return Rivals((), ())
+        return Rivals((), (), against)
     stored = {
         tuple(other.model_spec.get("effects", ())): other for other in _other_effects_alone(warehouse, parameter_set)
     }
@@ -72,7 +80,29 @@ def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progr
             sets.append(stored[names] if names in stored else _made(warehouse, parameter_set, names, progress))
         except KempfError as error:
             remarks.append(f"{' + '.join(names)} fits as well and is not among the models: {error.message}")
-    return Rivals(tuple(sets), tuple(remarks))
+    return Rivals(tuple(sets), tuple(remarks), against)
+
+
+def _against(found: Sequence[StoredDiagnosis], effects: Sequence[str]) -> tuple[str, ...]:
+    """Say which effects a model lacks by diagnoses of it, or of models with some of its effects, and what is left."""
+    of_less = [d for d in found if set((d.inputs.get("model") or {}).get("effects") or ()) <= set(effects)]
+    missing: dict[str, str] = {}
+    for diagnosis in of_less:
+        for entry in diagnosis.content.get("sets", ()):
+            if not set(effects) & set(entry["effects"]):
+                missing.setdefault(" or ".join(entry["effects"]), diagnosis.diagnosis_id)
+    if missing:
+        return (
+            f"{listed(list(dict.fromkeys(missing.values())))} found that the model lacks {listed(list(missing))}: that "
+            "is in no interval of this set; see `kempf effects add`",
+        )
+    left = [d for d in of_less if d.verdict in _LEFT]
+    if not left:
+        return ()
+    last = max(left, key=lambda d: d.diagnosis_id)
+    return (
+        f"{last.diagnosis_id} says {last.verdict.replace('_', ' ')}: what no known effect explains is in no interval",
+    )
 
 
 def _inputs(parameter_set: ParameterSet) -> Mapping[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import degrees, nan
+from math import degrees, isfinite, nan
 
 import numpy as np
 
@@ -37,7 +37,8 @@ class Beyond:
             return f"speed from {a:.3g} to {b:.3g} m/s, the logs cover {c:.3g} to {d:.3g} m/s"
         words = {"drift": "drift angle", "yaw_rate": "yaw rate r L / V", "rudder": "rudder"}[self.quantity]
         unit = f" {self.unit}" if self.unit else ""
-        return f"{words} up to {self.predicted[1]:.3g}{unit}, the logs cover {self.covered[1]:.3g}{unit}"
+        there = f"cover {self.covered[1]:.3g}{unit}" if isfinite(self.covered[1]) else "do not show it"
+        return f"{words} up to {self.predicted[1]:.3g}{unit}, the logs {there}"
 
 
 def covered(runs: Sequence[GridRun], scale_m: float) -> Reach:

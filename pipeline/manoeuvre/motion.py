@@ -49,10 +49,15 @@ def _kept(numbers, u, v, r, rudder, heading):  # type: ignore[no-untyped-def]
 @njit(**FILLING)
 def _steady(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
     """Return the forward speed of a steady turn, on the course of the approach where there is a wind, m/s."""
-    u = numbers[APPROACH]
-    for _ in range(_ROUNDS):
-        u = _kept(numbers, u, v, r, rudder, 0.0)
-    return u
+    # the faster she is the more the rudder costs: what she keeps falls, and meets the speed once
+    low, high = 0.0, 2.0 * max(numbers[APPROACH], numbers[SETTLED])
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _kept(numbers, middle, v, r, rudder, 0.0) > middle:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
 
 
 @njit(**FILLING)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import degrees
 
 import numpy as np
 
@@ -17,6 +18,8 @@ from kempf.schemas.errors import DataRejected
 
 #: an interval holds 95 %; it needs so many of the ships that were drawn
 _TAIL, ENOUGH = 2.5, 0.8
+#: from this share of its draws on a model is called unstable
+_MOSTLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ def predict(
     every = [_of_model(model, manoeuvre, count) for model in models]
     first = every[0].sailed
     if first is None or not every[0].sails:
-        raise _no_ship(models[0], manoeuvre, first is None, every[0].no_ships, count)
+        raise _no_ship(every[0], manoeuvre, logs, count)
     sailing = tuple(model for model in every if model.sails)
     samples = _samples(sailing)
     speed = models[0].waters.approach_m_s
@@ -167,13 +170,22 @@ def _of_model(model: Identified, manoeuvre: Manoeuvre, count: int) -> OfModel:
     return OfModel(model, manoeuvre.sailed(model.ship), drawn, count - len(drawn), unstable)
 
 
-def _no_ship(model: Identified, manoeuvre: Manoeuvre, itself: bool, lost: int, count: int) -> DataRejected:
+def _no_ship(first: OfModel, manoeuvre: Manoeuvre, logs: Reach, count: int) -> DataRejected:
+    model, itself, lost = first.model, first.sailed is None, first.no_ships
     whose = "the ship of the estimates and " if itself else ""
+    share = first.unstable / count
+    why = (
+        "An unstable hull without damping that grows with the motion turns without limit."
+        if share >= _MOSTLY
+        else "Straight on she is stable, but in a turn this hard her speed falls and she slides: what holds a hull "
+        "back there is not in the model, as no manoeuvre that it was identified from is as hard."
+    )
     return DataRejected(
         "predicts_no_ship",
         f"{model.name} predicts no {manoeuvre.name}: {whose}{lost} of {count} ships that its errors allow run away or "
-        "never come to its end. An unstable hull without damping that grows with the motion turns without limit.",
+        f"never come to its end. {why}",
         "Sail a turning circle or a spiral beside the zigzags and let `kempf diagnose` look for the damping; or "
-        "predict with a set that has it (--set), or with less rudder.",
-        {"no_ships": lost, "draws": count, "estimates_sail": not itself},
+        "predict with a set that has it (--set), or with less rudder: the logs cover "
+        f"{degrees(logs.rudder_rad):.3g} deg.",
+        {"no_ships": lost, "draws": count, "estimates_sail": not itself, "share_unstable": share},
     )

@@ -6,18 +6,19 @@ with which she holds a straight course.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import degrees, nan, pi
+from dataclasses import dataclass, replace
+from math import degrees, nan
 
 import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Ship
-from kempf.pipeline.manoeuvre.turning_circle import LONGEST
+from kempf.pipeline.manoeuvre.ship import Ship, Start
+from kempf.pipeline.manoeuvre.turning_circle import settled, turned
 
-#: how long she is watched, in ship lengths on the approach; the end of it, over which what is left is averaged
-_WATCHED, _END = 60.0, 10.0
+#: how long the steady turn is held, so that what effects remember is that of the turn, and how long she is watched
+#: then, in ship lengths on the approach; the end of it, over which what is left is averaged
+_HELD, _WATCHED, _END = 10.0, 60.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,19 @@ class PullOut:
     def sailed(self, ship: Ship) -> Sailed | None:
         """Sail it; the curve has columns time from the order amidships, s, and yaw rate, rad/s."""
         own, side = ship.waters.own_time_s, self.side
-        turn = [side * self.rudder_rad, side, side * 3.0 * pi, LONGEST * own]
-        track = ship.sail(np.array([turn, [nan, 0.0, 0.0, _WATCHED * own]]))
+        turn = turned(ship, side, self.rudder_rad)
+        if turn is None:
+            return None
+        order, balance = side * self.rudder_rad, settled(ship, side, self.rudder_rad, turn)
+        if balance is None:
+            # one whose speed falls on and on comes out of the turn as she is after one and a half
+            forward, lateral, rate_rad_s = turn.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE]].tolist()
+            start = Start(forward, lateral, rate_rad_s, order)
+        else:
+            start = Start(balance.forward_m_s, balance.lateral_m_s, balance.yaw_rate_rad_s, order)
+        track = replace(ship, waters=replace(ship.waters, start=start)).sail(
+            np.array([[order, 0.0, 0.0, 0.0 if balance is None else _HELD * own], [nan, 0.0, 0.0, _WATCHED * own]])
+        )
         if track.how != motion.SAILED:
             return None
         begin = int(track.ends[0])

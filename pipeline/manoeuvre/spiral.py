@@ -19,6 +19,8 @@ from kempf.pipeline.manoeuvre.ship import Balance, Ship
 
 #: r L / V0 from which on no ship is looked at, and steps of the curve up to there
 _FASTEST, _STEPS = 3.0, 240
+#: by so much rudder it is followed on; of the speed no more changes from one turn to the next
+_RUDDER_STEP, _TORN = radians(0.25), 0.1
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,11 @@ class Spiral:
         return orders
 
     def _arm(self, ship: Ship, side: int) -> list[Balance] | None:
-        """Return the curve to one side up to the outermost rudder, None where it does not come to it."""
+        """Return the curve to one side up to the outermost rudder, None where it does not come to it.
+
+        It is followed by yaw rates, of which each has one rudder, also within the loop of an unstable ship. Where more
+        rudder costs so much speed that she turns no faster it is followed on by rudder angles.
+        """
         own = ship.waters.own_time_s
         arm: list[Balance] = []
         start = None
@@ -79,14 +85,29 @@ class Spiral:
         rate = step
         while rate < _FASTEST / own:
             balance = ship.rudder_for(side * rate, start)
-            if balance is None or (arm and not np.isfinite(balance.rudder_rad)):
-                return None
+            if balance is None or (arm and _torn(arm[-1], balance)):
+                return self._on_by_rudder(ship, side, arm)
             arm.append(balance)
             start = balance.solution
             if side * balance.rudder_rad >= self.rudder_rad:
                 return arm
             rate += step
         return None
+
+    def _on_by_rudder(self, ship: Ship, side: int, arm: list[Balance]) -> list[Balance] | None:
+        """Return the curve with the rudder angles beyond it, None where she does not hold a turn with them."""
+        # within the loop more rudder is no way on
+        if len(arm) < 2 or not 0.0 < side * arm[-2].rudder_rad < side * arm[-1].rudder_rad:
+            return None
+        while side * arm[-1].rudder_rad < self.rudder_rad:
+            start = arm[-1].solution.copy()
+            start[1] = arm[-1].yaw_rate_rad_s
+            rudder = min(side * arm[-1].rudder_rad + _RUDDER_STEP, self.rudder_rad)
+            balance = ship.rate_by(side * rudder, start)
+            if balance is None or _torn(arm[-1], balance):
+                return None
+            arm.append(balance)
+        return arm
 
     def _direct(self, rudder: Float, rate: Float, order: float, middle: int) -> tuple[float, float]:
         """Return the yaw rates at a rudder angle that is come to from starboard, and from port."""
@@ -96,6 +117,12 @@ class Spiral:
         falling = _on(rudder[turn:], rate[turn:], order) if order >= rudder[turn] else nan
         rising = _on(rudder[: back + 1], rate[: back + 1], order) if order <= rudder[back] else nan
         return (rising if np.isnan(falling) else falling), (falling if np.isnan(rising) else rising)
+
+
+def _torn(last: Balance, balance: Balance) -> bool:
+    """Return whether a turn is not the one beside another, but of another part of the curve or of none."""
+    change = abs(balance.forward_m_s - last.forward_m_s)
+    return not np.isfinite(balance.rudder_rad) or change > _TORN * last.forward_m_s
 
 
 def _on(rudder: Float, rate: Float, order: float) -> float:

@@ -1,22 +1,26 @@
-"""The turning circle: rudder hard over on a straight course, and kept there for one and a half turns.
+"""The turning circle: rudder hard over on a straight course, and kept there.
 
+Her speed falls for longer than one and a half turns: the steady figures are those of the turn that she comes to, unless
+a circle of so many turns as one that was measured is asked for. Then they are means over the last turn, as measured.
 IMO MSC.137(76), 4.2 and 5.3.1; ISO 13643-3.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi
+from math import degrees, pi
 
 import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Ship
+from kempf.pipeline.manoeuvre.ship import Balance, Ship, Track
 from kempf.pipeline.segment.turning_figures import turning_figures
 
 #: a ship that takes longer for a whole circle, in ship lengths on the approach, does not turn
 LONGEST = 400.0
+#: a steady turn whose yaw rate is farther off the one at the end of a turn, as a share of it, is another one
+_BESIDE = 0.5
 #: the figures that are given
 FIGURES = (
     "advance_m",
@@ -39,16 +43,14 @@ class TurningCircle:
     rudder_rad: float
     #: +1 to starboard, -1 to port.
     side: int = 1
-    #: Of the heading, in all.
-    turn_rad: float = 3.0 * pi
+    #: Of the heading, in all, as one that was measured; None: until the turn is steady.
+    turn_rad: float | None = None
     name: str = "turning-circle"
 
     def sailed(self, ship: Ship) -> Sailed | None:
         """Sail it; the curve has columns along and across the approach, m, across positive to the side of the turn."""
-        longest = LONGEST * ship.waters.own_time_s
-        order = self.side * self.rudder_rad
-        track = ship.sail(np.array([[order, self.side, self.side * self.turn_rad, longest]]))
-        if track.how != motion.SAILED:
+        track = turned(ship, self.side, self.rudder_rad, self.turn_rad)
+        if track is None:
             return None
         r = track.rows
         forward, lateral = r[:, motion.FORWARD], r[:, motion.LATERAL]
@@ -56,5 +58,37 @@ class TurningCircle:
             *(r[:, motion.TIME], r[:, motion.NORTH], r[:, motion.EAST], r[:, motion.HEADING]),
             *(np.hypot(forward, lateral), np.arctan2(-lateral, forward), 0.0),
         )
+        named = {name: getattr(figures, name) for name in FIGURES}
+        if self.turn_rad is None:
+            named |= _steady(ship, self.side, self.rudder_rad, track)
         curve = thinned(np.column_stack([r[:, motion.NORTH], self.side * r[:, motion.EAST]]))
-        return Sailed({name: getattr(figures, name) for name in FIGURES}, curve, reach_of(track, ship.waters.length_m))
+        return Sailed(named, curve, reach_of(track, ship.waters.length_m))
+
+
+def turned(ship: Ship, side: int, rudder_rad: float, turn_rad: float | None = None) -> Track | None:
+    """Return a turn by an angle, rad, one and a half by default; None where she runs away or never comes round."""
+    angle, longest = 3.0 * pi if turn_rad is None else turn_rad, LONGEST * ship.waters.own_time_s
+    track = ship.sail(np.array([[side * rudder_rad, side, side * angle, longest]]))
+    return track if track.how == motion.SAILED else None
+
+
+def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance | None:
+    """Return the steady turn that one comes to; None where there is none beside the end of it."""
+    start = np.zeros(2 + ship.waters.model.extra)
+    start[0], start[1] = track.rows[-1, motion.LATERAL], track.rows[-1, motion.RATE]
+    balance = ship.rate_by(side * rudder_rad, start)
+    return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
+
+
+def _steady(ship: Ship, side: int, rudder_rad: float, track: Track) -> dict[str, float]:
+    """Return the steady figures of the turn that she comes to; none where that is not known."""
+    balance = settled(ship, side, rudder_rad, track)
+    if balance is None:
+        return {}
+    speed, before = np.hypot(balance.forward_m_s, balance.lateral_m_s), track.rows[0]
+    return {
+        "steady_diameter_m": float(2.0 * speed / abs(balance.yaw_rate_rad_s)),
+        "steady_yaw_rate_deg_s": degrees(balance.yaw_rate_rad_s),
+        "steady_drift_deg": degrees(float(np.arctan2(-balance.lateral_m_s, balance.forward_m_s))),
+        "speed_loss_percent": float(100.0 * (1.0 - speed / np.hypot(before[motion.FORWARD], before[motion.LATERAL]))),
+    }

@@ -19,15 +19,18 @@ from tests.manoeuvre.ships import ship_of, unstable
 
 
 @pytest.mark.parametrize("name", ["mariner", "container", "usv"])
-def test_a_turning_circle_is_that_of_the_simulator(name: str) -> None:
+@pytest.mark.parametrize("turns", [1.5, 12.0])
+def test_a_turning_circle_is_that_of_the_simulator(name: str, turns: float) -> None:
     hull = HULLS[name]
-    trial = simulate_trial(TrialSettings(hull, (sailed.SteadyCourse(10.0), sailed.TurningCircle(25.0, 540.0))))
+    circle = sailed.TurningCircle(25.0, 360.0 * turns)
+    trial = simulate_trial(TrialSettings(hull, (sailed.SteadyCourse(10.0), circle)))
     record, path = trial.truth.manoeuvres[1], trial.truth.trajectory
     rows = slice(round(record.start_s / path.step_s), round(record.end_s / path.step_s) + 1)
     v, _, psi, north, east, forward = path.state[rows].T
     time = path.time_s[rows] - record.start_s
     truth = turning_figures(time, north, east, psi, np.hypot(forward, v), np.arctan2(-v, forward), 0.0)
-    made = TurningCircle(radians(25.0)).sailed(ship_of(hull))
+    # by itself one is sailed until the turn is steady
+    made = TurningCircle(radians(25.0), turn_rad=3.0 * pi if turns == 1.5 else None).sailed(ship_of(hull))
     assert made is not None
     for figure in ("advance_m", "transfer_m", "tactical_diameter_m", "steady_yaw_rate_deg_s", "time_to_180_s"):
         assert made.figures[figure] == pytest.approx(getattr(truth, figure), rel=2e-3), figure
@@ -202,3 +205,27 @@ def test_a_slow_gear_makes_the_advance_longer_by_the_way_that_it_takes() -> None
     # half the time that the rudder is late, at the speed of the approach
     longer = 0.5 * (35.0 / 2.5 - 35.0 / 10.0) * ship.waters.approach_m_s
     assert slow.figures["advance_m"] - fast.figures["advance_m"] == pytest.approx(longer, rel=0.15)
+
+
+def test_circle_pull_out_and_spiral_come_to_the_same_steady_turn() -> None:
+    ship = ship_of(HULLS["ferry"])
+    circle, out, spiral = (one.sailed(ship) for one in (TurningCircle(0.35), PullOut(0.35), Spiral(0.35)))
+    assert circle is not None
+    assert out is not None
+    assert spiral is not None
+    rate = circle.figures["steady_yaw_rate_deg_s"]
+    assert out.figures["steady_yaw_rate_deg_s"] == pytest.approx(rate, rel=1e-3)
+    assert spiral.figures["from_starboard_deg_s.0"] == pytest.approx(rate, rel=1e-3)
+
+
+def test_a_spiral_goes_on_where_more_rudder_turns_her_no_faster() -> None:
+    ship = unstable()
+    # a turn costs her so much speed that the yaw rate falls again before hard over
+    slow = replace(ship, surge=np.array([6.0, 0.0, 0.3, 6.0, 0.0]))
+    made = Spiral(radians(35.0)).sailed(slow)
+    assert made is not None
+    rates = [made.figures[f"from_starboard_deg_s.{k}"] for k in range(4)]
+    assert rates[0] < max(rates[1:])
+    hard = TurningCircle(radians(35.0)).sailed(slow)
+    assert hard is not None
+    assert rates[0] == pytest.approx(hard.figures["steady_yaw_rate_deg_s"], rel=5e-3)

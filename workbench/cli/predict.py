@@ -156,7 +156,7 @@ def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
         print_paragraph(f"extrapolated: {beyond.sentence}")
     if predicted.own_zigzags is not None:
         print_paragraph(predicted.own_zigzags.sentence)
-    for sentence in predicted.limits:
+    for sentence in (*predicted.against, *predicted.limits):
         print_paragraph(f"limit: {sentence}")
     for sentence in predicted.assumed:
         print_paragraph(f"assumed: {sentence}")

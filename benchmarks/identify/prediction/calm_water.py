@@ -12,6 +12,7 @@ from benchmarks.identify.prediction.compared import (
     ANGLES_DEG,
     OVERSHOOTS,
     RUDDERS_DEG,
+    TURNS,
     Truth,
     circle,
     circle_figures,
@@ -22,12 +23,12 @@ from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.schemas.errors import DataRejected
 
 #: Steady course before the first execute and the longest that a manoeuvre takes, in ship lengths at the trial speed.
-_STEADY_LENGTHS, _LONGEST_LENGTHS = 80.0, 200.0
+_STEADY_LENGTHS, _LONGEST_LENGTHS = 80.0, 1000.0
 #: Of the grid: a helmsman who answers at its points is late by no more than a thousandth of a length.
 _CELLS_A_LENGTH = 1000.0
 #: Of the water, in draughts.
 _DEEP = 1e6
-_TURN_RAD = 3.0 * np.pi
+_TURN_RAD = 2.0 * np.pi * TURNS
 
 
 def truth_of(hull: SimulatedHull, strengths: Float) -> Truth:
@@ -73,7 +74,7 @@ def sailed(
     Parameters
     ----------
     heading_rad : float
-        Heading change that ends a leg: one leg of one and a half turns is a circle.
+        Heading change that ends a leg: one leg of many turns is a circle.
 
     Returns
     -------

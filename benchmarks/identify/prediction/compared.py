@@ -69,6 +69,10 @@ def circle(rudder_deg: float) -> str:
     return f"circle, {rudder_deg:g} deg"
 
 
+#: Turns of a circle: her speed falls on for several before the turn is steady.
+TURNS = 12
+
+
 def zigzag(heading_deg: float, rudder_deg: float) -> str:
     """Return the name of a zigzag on the page."""
     return f"zigzag {heading_deg:g}/{rudder_deg:g}"

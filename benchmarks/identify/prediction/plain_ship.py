@@ -18,6 +18,7 @@ from benchmarks.identify.prediction.compared import (
     ANGLES_DEG,
     OVERSHOOTS,
     RUDDERS_DEG,
+    TURNS,
     ComparedShip,
     Truth,
     circle,
@@ -146,7 +147,7 @@ def _truth(hull: SimulatedHull) -> Truth:
 
 
 def _circle(hull: SimulatedHull, rudder_deg: float) -> dict[str, float]:
-    time, state = _sailed(hull, TurningCircle(rudder_deg, 540.0))
+    time, state = _sailed(hull, TurningCircle(rudder_deg, 360.0 * TURNS))
     v, _, psi, north, east, forward = state.T
     return circle_figures(time, north, east, psi, v, forward)
 
