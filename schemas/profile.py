@@ -89,7 +89,8 @@ class TimeColumn(_Grown):
     #: date, time: columns of the date and of the time of day, where they stand apart
     date: str | None = None
     time: str | None = None
-    #: how the date is written, such as dd.mm.yyyy; None for ISO 8601, yyyy-mm-dd or yyyymmdd
+    #: how the date is written, such as dd.mm.yyyy, in its own column or before the time of day in that of the whole
+    #: instant; None for ISO 8601, yyyy-mm-dd or yyyymmdd
     date_form: str | None = None
     #: None for ISO 8601 text; else the unit of an elapsed or epoch number, or of seconds since midnight
     unit: Literal["s", "ms", "us", "ns"] | None = None
@@ -122,8 +123,10 @@ class TimeColumn(_Grown):
             raise ValueError("column is that of the whole instant; with date and time leave it out")
         if self.date is not None and self.start is not None:
             raise ValueError("start is that of an elapsed time; the column of the date says the day")
-        if self.date_form is not None and self.date is None:
-            raise ValueError("date_form is that of the column date")
+        if self.date_form is not None and self.date is None and (self.column is None or self.unit is not None):
+            raise ValueError(
+                "date_form is that of the column date, or of a column of date and time of day without unit"
+            )
         if self.column is None and self.date is None and self.interval_s is None and self.start is None:
             raise ValueError("give column, or date and time, or interval_s")
         return self
@@ -139,7 +142,7 @@ class TimeColumn(_Grown):
         return self.start is not None or not self.columns
 
 
-class Source(Frozen):
+class Source(_Grown):
     """How the files of one kind are read; the first source whose pattern matches the file name is used."""
 
     match: str
@@ -149,10 +152,14 @@ class Source(Frozen):
     encoding: str = "utf-8"
     #: one character, or ``whitespace`` for any run of blanks; None reads it from the header
     separator: str | None = None
+    #: the sign before the decimals of a number; None for a point
+    decimal: Literal[".", ","] | None = None
     #: lines before the data that are not column names
     header_lines: int = Field(default=0, ge=0, le=1_000_000)
     #: names of the columns where the file has no line that names them
     columns: list[str] | None = None
+
+    _later: ClassVar[frozenset[str]] = frozenset({"decimal"})
 
     @field_validator("separator")
     @classmethod

@@ -245,7 +245,8 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
         "no_segments",
         f"Neither a zigzag nor a random manoeuvre was found in the {len(held)} logs of {vessel!r}, so there is nothing "
         "to identify from.",
-        "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
+        "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to which "
+        "no model is fitted.",
         {"vessel": vessel, "logs": [row.file_name for row in held]},
     )
 

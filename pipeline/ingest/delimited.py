@@ -20,6 +20,8 @@ from kempf.schemas.profile import Source
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 
+#: A number with a comma before its decimals, and how many cells of a column are looked at for one.
+_COMMA, _LOOKED_AT_CELLS = r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", 2000
 #: Most characters of a cell that are looked at: far more than any number or time has.
 _LONGEST_CELL = 1_000
 
@@ -75,7 +77,8 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     Raises
     ------
     UsageError
-        The encoding is unknown.
+        The encoding is unknown; ``no_time_column``; ``decimal_comma``: numbers are written with a comma that the
+        profile does not name.
     DataRejected
         A column that the profile maps is not in the file, two columns bear its name, or the rows are not spaced as the
         profile says.
@@ -87,6 +90,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     _check_columns(name, layout, wanted)
     check_once(name, source.channels)
     whole, cells = _cells(layout, wanted)
+    cells = _with_points(name, cells, source)
     n = len(layout.rows)
     reason = np.zeros(n, dtype=np.int8)
     reason[~whole] = CODE[Reason.MALFORMED]
@@ -208,6 +212,24 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             "Name the columns in the profile ('columns', with the file's own names among 'header_lines').",
             {"name": name, "columns": twice},
         )
+
+
+def _with_points(name: str, cells: dict[str, pl.Series], source: Source) -> dict[str, pl.Series]:
+    """Return the cells with a point before the decimals; a comma that the profile does not name is refused."""
+    if source.decimal == ",":
+        return {column: cell.str.replace(_COMMA, "$1.$2") for column, cell in cells.items()}
+    for column in source.channels:
+        shown = cells[column].head(_LOOKED_AT_CELLS).drop_nulls()
+        with_comma = shown.filter(shown.str.contains(_COMMA))
+        if 2 * len(with_comma) > len(shown):
+            raise UsageError(
+                "decimal_comma",
+                f"{name} writes numbers with a decimal comma, such as {with_comma[0]!r} in the column {column!r}; "
+                "expected a point.",
+                "Write `decimal: ','` into the profile's source for this log.",
+                {"name": name, "column": column, "example": with_comma[0]},
+            )
+    return cells
 
 
 def _cells(layout: Layout, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:

@@ -23,6 +23,10 @@ MOST_TEXT_BYTES = 2 << 30
 
 #: Notes that a refusal repeats, at most.
 _NOTES = 3
+#: Reasons of which a sound log may have many, and share of refused records from which a note says so.
+_ORDINARY, _MOSTLY = ("no_channel", "duplicate", "same_instant", "void"), 0.5
+#: Characters of a record that it shows.
+_CUT = 160
 
 _SEE_PROFILE = "See docs/profile.md for how to describe a log."
 
@@ -110,7 +114,8 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             continue
         if summary.tally.records_kept == 0:
             raise _nothing(name, checked, summary)
-        yield replace(clocks.set_right(checked), notes=(*notes, *dated.notes, *checked.notes, *clocks.notes()))
+        own = (*summary.notes(), *notes, *dated.notes, *checked.notes, *clocks.notes())
+        yield replace(clocks.set_right(checked), notes=own)
 
 
 class _Summary:
@@ -127,6 +132,18 @@ class _Summary:
             unset = part.rejected.filter(pl.col("reason") == "clock_unset")["time_utc_ns"].to_list()
             times = [*(self.unset or ()), *unset]
             self.unset = min(times), max(times)
+
+    def notes(self) -> list[str]:
+        """Return what a log is to be doubted for of which most was refused, other than for what it is no log of."""
+        refused = {reason: n for reason, n in self.tally.by_reason.items() if reason not in _ORDINARY}
+        most = max(sorted(refused), key=lambda reason: refused[reason], default="")
+        if not most or refused[most] <= _MOSTLY * self.tally.records_read:
+            return []
+        why = " Do its rows run backwards in time?" if most == "clock_back" else ""
+        return [
+            f"{refused[most]} refusals, most of the log, are {most}: see whether the profile fits it, and `kempf logs "
+            f"rejected`.{why}"
+        ]
 
 
 def _decode(
@@ -192,6 +209,8 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
     step = {
         "clock_unset": "The logger's clock was not set, or the unit of the time column is another: correct the unit in "
         "the profile or the times in a copy of the log, or ingest another log.",
+        "malformed": "See whether the profile says how time and columns are written: a date such as 31/12/2025, by "
+        "itself or before the time of day, takes `date_form: dd/mm/yyyy`. " + _SEE_PROFILE,
         "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
         "no_channel": "The log holds none of the canonical channels: check that it is the right file.",
@@ -200,7 +219,8 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
     return DataRejected(
         "no_valid_reading",
         f"{name} holds no valid reading: {summary.tally.records_read} records, "
-        f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in last.notes[:_NOTES])}",
+        f"of them {listed or 'none usable'}.{years}{_sample(last, most)}"
+        f"{''.join(f' {note}' for note in last.notes[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
         {
             "name": name,
@@ -209,6 +229,15 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
             "notes": list(last.notes),
         },
     )
+
+
+def _sample(last: Readings, reason: str) -> str:
+    """Return the first record that was refused for a reason, cut."""
+    raw = last.rejected.filter(pl.col("reason") == reason)["raw"].drop_nulls() if last.rejected.height else None
+    if raw is None or not len(raw):
+        return ""
+    text = str(raw[0])
+    return f" The first that is {reason}: {text[:_CUT] + ('...' if len(text) > _CUT else '')!r}."
 
 
 def _year(time_utc_ns: int) -> int:

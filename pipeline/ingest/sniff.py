@@ -13,6 +13,7 @@ MCAP_MAGIC = b"\x89MCAP0\r\n"
 #: Documents and pictures that are handed over for a log now and then, by how they begin.
 _NO_LOGS = (
     (b"%PDF-", "a PDF document"),
+    (b"PK\x03\x04", "a zip archive, as a workbook (.xlsx) is"),
     (b"\x89PNG\r\n", "a PNG picture"),
     (b"\xff\xd8\xff", "a JPEG picture"),
     (b"\xd0\xcf\x11\xe0", "an old Office document"),

@@ -207,3 +207,34 @@ def test_a_row_longer_than_any_is_refused_and_the_others_are_kept():
     assert readings.frame["heading_rad"].to_list() == [math.radians(1), math.radians(3)]
     (raw,) = readings.rejected["raw"].to_list()
     assert raw.startswith(f'{T}2Z,"777')
+
+
+def test_a_decimal_comma_is_read_where_the_profile_names_it():
+    text = f"utc;sog;hdg\n{T}1,5Z;8,20162;-1\n{T}2,5Z;,5;1,5e1\n{T}3,5Z;7;90,0\n"
+    readings = read(text, profile(decimal=","))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(x) for x in (-1.0, 15.0, 90.0)]
+    assert readings.frame["speed_over_ground_m_s"].to_list() == [
+        pytest.approx(x * 1852 / 3600) for x in (8.20162, 0.5, 7.0)
+    ]
+
+
+def test_a_decimal_comma_that_the_profile_does_not_name_is_refused_with_its_line():
+    with pytest.raises(UsageError) as error:
+        read(f"utc;sog;hdg\n{T}1Z;8,20162;90\n{T}2Z;8,3;91\n")
+    assert error.value.code == "decimal_comma" and "'8,20162'" in error.value.message
+    assert "decimal: ','" in error.value.next_step
+
+
+def test_a_log_of_which_most_is_refused_says_so_first():
+    rows = "".join(f"{T}{9 - k}Z,{k + 1},90\n" for k in range(9))
+    readings = read("utc,sog,hdg\n" + rows)
+    assert readings.tally.by_reason == {"clock_back": 8}
+    assert readings.notes[0].startswith("8 refusals, most of the log, are clock_back")
+    assert "backwards" in readings.notes[0]
+
+
+def test_nothing_that_can_be_read_is_shown_by_a_sample():
+    with pytest.raises(DataRejected) as error:
+        read("utc,sog,hdg\n03/05/2025 07:47:01,8,90\n")
+    assert error.value.code == "no_valid_reading" and "'03/05/2025 07:47:01,8,90'" in error.value.message
+    assert "date_form" in error.value.next_step

@@ -50,6 +50,16 @@ def test_date_and_time_in_two_columns(day: str, clock: str, more: dict) -> None:
     assert ("Times without a zone are taken as UTC." in readings.notes) != zoned
 
 
+@pytest.mark.parametrize(
+    ("instant", "form"),
+    [("03/05/2025 07:47:01", "dd/mm/yyyy"), ("5/3/2025 07:47:01.0", "mm/dd/yyyy"), ("03.05.25T07:47:01", "dd.mm.yy")],
+)
+def test_date_and_time_in_one_column_that_is_not_iso(instant: str, form: str) -> None:
+    readings = read(f"utc;hdg\n{instant};90\n{instant[:8]};91\nx;92\n", {"column": "utc", "date_form": form})
+    assert readings.frame["time_utc_ns"].to_list() == [WANTED]
+    assert readings.tally.by_reason == {"malformed": 2}
+
+
 def test_a_night_goes_on_behind_midnight() -> None:
     readings = read("day,at,hdg\n2024-02-28,23:59:59.5,1\n2024-02-29,00:00:00.5,2\n", {"date": "day", "time": "at"})
     first, second = readings.frame["time_utc_ns"].to_list()
@@ -72,7 +82,7 @@ def test_a_date_that_is_not_of_the_form_is_refused_row_by_row() -> None:
         {"date": "day", "time": "at", "column": "utc"},
         {"date": "day", "time": "at", "date_form": "dd.mm"},
         {"date": "day", "time": "at", "date_form": "dd.mm/yyyy"},
-        {"column": "utc", "date_form": "dd.mm.yyyy"},
+        {"column": "t", "unit": "s", "date_form": "dd.mm.yyyy"},
         {"date": "day", "time": "at", "start": "2025-05-03T00:00:00Z"},
         {"column": "t", "unit": "s", "interval_s": 0},
     ],

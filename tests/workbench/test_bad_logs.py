@@ -47,6 +47,7 @@ def clean(ship: Ship) -> list[bytes]:
         ("empty.nmea", b"", 3, "empty_log"),
         ("empty.gz", gzip.compress(b"", mtime=0), 3, "unknown_format"),
         ("report.pdf", b"%PDF-1.7\n% trial report\n", 3, "unknown_format"),
+        ("workbook.csv", b"PK\x03\x04\x14\x00\x06\x00" + bytes(range(256)), 3, "unknown_format"),
         ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 20, 3, "unknown_format"),
         ("zeros.bin", bytes(10_000), 3, "unknown_format"),
         ("cut.mcap", b"\x89MCAP0\r\n", None, None),

@@ -143,15 +143,13 @@ def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
     if len(shown["models"]) > 1:
         _print_models(predicted)
     for criterion in predicted.prediction.imo:
-        limit = f"{number(criterion.limit)} {criterion.unit}: " if criterion.limit is not None else ""
+        limit = f", at most {number(criterion.limit)} {criterion.unit}" if criterion.limit is not None else ""
         verdict = (
             f"fulfilled with a probability of {100 * criterion.probability:.0f} %"
             if criterion.probability is not None
             else "not judged"
         )
-        print_paragraph(
-            f"IMO {criterion.name}, at most {limit}{verdict}" + (f" ({criterion.why})" if criterion.why else "")
-        )
+        print_paragraph(f"IMO {criterion.name}{limit}: {verdict}" + (f" ({criterion.why})" if criterion.why else ""))
     for beyond in predicted.prediction.extrapolated:
         print_paragraph(f"extrapolated: {beyond.sentence}")
     if predicted.own_zigzags is not None:

@@ -38,12 +38,16 @@ def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     sentences = [first]
     if widths:
         sentences.append(
-            f"half an interval is {100.0 * median(widths):.2g} % of what is predicted in the median, "
-            f"{100.0 * max(widths):.2g} % at most"
+            f"half an interval is {_percent(median(widths))} % of what is predicted in the median, "
+            f"{_percent(max(widths))} % at most"
         )
     if agree < _MOST * len(figures):
         sentences.append(_LACKS)
     return sentences
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f}" if share >= 1.0 else f"{100.0 * share:.2g}"
 
 
 def sentence_of(found: OneSided) -> str:

@@ -80,6 +80,11 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
     notes: list[str] = []
     if column.date is not None and column.time is not None:
         instant, good = _of_two(cells[column.date], cells[column.time], column, notes)
+    elif column.column is not None and column.date_form is not None:
+        # the date, what parts it from the time of day, and that
+        text = cells[column.column]
+        date, time = (text.str.extract(r"^(\S+?)[T\s]+(.+)$", group) for group in (1, 2))
+        instant, good = _of_two(date, time, column, notes)
     elif column.unit is None:
         instant, good, zoned = iso_instants(spans_of(cells[column.columns[0]]))
         if bool(np.any(good & ~zoned)):
