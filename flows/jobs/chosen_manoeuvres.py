@@ -70,8 +70,8 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
             f"Neither a zigzag nor a random manoeuvre was found in the {len(rows)} logs of {vessel!r}."
             if not left
             else f"None of the {len(left)} manoeuvres of {vessel!r} counts: {'; '.join(sorted(set(left.values())))}.",
-            "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to which "
-            "no model is fitted.",
+            "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to "
+            "which no model is fitted.",
             {"vessel": vessel, **({"skipped": left} if left else {})},
         )
     profile_sha256 = rows[max(manoeuvres, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256

@@ -20,11 +20,12 @@ from kempf.pipeline.segment.ramps import Ramp, approach_before, measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.switching import Start
 from kempf.pipeline.segment.turn_track import track_of
+from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD
 from kempf.pipeline.segment.yaw_rate import mean_yaw_rate
 from kempf.pipeline.segment.zigzag import Side
 
-#: Heading change that makes a circle of a turn from a steady approach, and from any other one, rad.
-_HALF_TURN, _WHOLE_TURN = pi, 2.0 * pi
+#: Heading change that makes a circle of a turn from a steady approach, rad; from any other one it has to be steady.
+_HALF_TURN = pi
 
 #: Largest difference of the heading in the approach from the one at the execute, rad.
 _APPROACH_RAD = float(np.deg2rad(3.0))
@@ -111,7 +112,7 @@ def turning_circle(
     -------
     TurningCircle or None
         None where it is none: the rudder is too small or was not put over by one movement, the heading changed by less
-        than 180 deg or away from the rudder's side, or by less than 360 deg from an approach that was not steady; or
+        than 180 deg or away from the rudder's side, or by less than 350 deg from an approach that was not steady; or
         she went across her bow for long, as no ship under way does.
 
     References
@@ -143,7 +144,7 @@ def turning_circle(
         approach_s = begin_s
     at_end = value_and_rate(signals.heading_s, signals.heading, end_s, 0.08 * quarter_s)[0]
     change = side * (at_end - base)
-    if change < (_HALF_TURN if start == "steady" else _WHOLE_TURN):
+    if change < (_HALF_TURN if start == "steady" else STEADY_FROM_RAD):
         return None
     track = track_of(instruments, signals.origin_ns, approach_s, end_s, quarter_s)
     if track.bridged_share > _ACROSS_SHARE or track.time_s.size < _FEWEST:

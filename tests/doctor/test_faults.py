@@ -249,3 +249,12 @@ def test_both_speeds_in_one_wrong_unit_are_one_fault() -> None:
     assert [(f.kind, f.channels, f.name) for f in finding.faults] == [
         ("unit", ("speed_over_ground", "speed_through_water"), "kn taken for m/s")
     ]
+
+
+def test_a_heading_in_radians_is_named_also_where_it_passes_north() -> None:
+    log = closed_form_ship.log()
+    heading = log.series["heading"]
+    # written from 0 to 6.28 and read as degrees: what is 360 deg in the log is 6.28 deg, and nothing is unwrapped
+    shown = np.deg2rad(np.mod(heading.value, 2.0 * np.pi))
+    (finding,) = examine(log.with_series({"heading": Series(heading.time_utc_ns, shown)})).findings
+    assert [(f.kind, f.channels, f.name) for f in finding.faults] == [("unit", ("heading",), "rad taken for deg")]

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
@@ -27,6 +27,8 @@ _CHANNELS = ("heading", "yaw_rate")
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Find the largest leap of the heading against the integral of the yaw rate.
 
+    One in radians taken for degrees leaps by 6.28 deg whenever the ship passes north.
+
     Returns
     -------
     list of Outcome
@@ -37,6 +39,18 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     if does_not_move(log):
         return [untestable("heading_leap", _CHANNELS, STILL)]
     heading = log.series["heading"]
+    if _in_radians(heading.value):
+        words = "the heading runs from 0 to 6.28 deg and begins again"
+        figure = Figure(
+            "leap of the heading",
+            float(np.rad2deg(np.max(np.abs(np.diff(heading.value))))),
+            0.01,
+            0.0,
+            _LEAST_DEG,
+            "deg",
+        )
+        suspects = tuple(unit_faults(("heading",), "rad"))
+        return [Outcome("heading_leap", _CHANNELS, "disagree", words, (figure,), 1.0, suspects)]
     turned = integral(log.series["yaw_rate"])
     left = heading.value - turned.at(heading.time_utc_ns, gap_limit_s(turned))
     leaps = _leaps(heading, left)
@@ -55,6 +69,12 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     words = f"the heading leaps by {np.rad2deg(leaps[k]):+.1f} deg at {clock} UTC, which the yaw rate does not show"
     fault = Fault("leap", ("heading",), float(leaps[k]), start_utc_ns=at)
     return [Outcome("heading_leap", _CHANNELS, "disagree", words, (figure,), 1.0, (fault,))]
+
+
+def _in_radians(heading: Float) -> bool:
+    """Return whether a heading passes north as one does that is in radians and was taken for degrees."""
+    turn = float(np.deg2rad(2.0 * np.pi))
+    return float(np.ptp(heading)) < 1.01 * turn and float(np.max(np.abs(np.diff(heading)), initial=0.0)) > 0.95 * turn
 
 
 def _leaps(heading: Series, left: Float) -> Float:
