@@ -21,7 +21,7 @@ from kempf.warehouse import segments
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
-_KINDS = {TurningCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
+_KINDS: dict[type, str] = {TurningCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
 #: ships drawn for each measured manoeuvre
 _DRAWS = 128
 #: rudder angles that differ by less are the same order, deg
@@ -104,6 +104,12 @@ def measured_beside(
     matches = [s for s in segments.every(warehouse, predicted.vessel) if _same_order(s, manoeuvre)]
     every = as_sailed(warehouse, predicted, [(segment, manoeuvre) for segment in matches], progress)
     return tuple(beside(predicted, sailed) for sailed in every)
+
+
+def measured_kind(warehouse: Warehouse, predicted: Predicted) -> int:
+    """Return how many manoeuvres of the kind of a prediction were measured."""
+    kind = _KINDS[type(predicted.prediction.manoeuvre)]
+    return sum(segment.kind == kind for segment in segments.every(warehouse, predicted.vessel))
 
 
 def other_orders(warehouse: Warehouse, predicted: Predicted) -> dict[str, int]:

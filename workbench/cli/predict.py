@@ -73,7 +73,7 @@ def command(
     data as well. What is beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
     from kempf.flows.jobs.checked_prediction import predict_checked
-    from kempf.flows.jobs.compare_predicted import measured_beside, other_orders
+    from kempf.flows.jobs.compare_predicted import measured_beside, measured_kind, other_orders
     from kempf.flows.jobs.predict_request import PredictRequest
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.prediction import prediction_document
@@ -101,6 +101,9 @@ def command(
         if others:
             by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
             print_paragraph(f"not compared, as they are of other angles: {by_option}")
+        if not compare and manoeuvre != "zigzag" and (count := measured_kind(Warehouse(uri), predicted)):
+            words = f"{manoeuvre.replace('-', ' ')}{'s' if count > 1 else ''}"
+            print_paragraph(f"measured: {count} {words}; --compare lays the prediction over those of this rudder")
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:

@@ -108,7 +108,7 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequenc
     return {
         "insufficient_data": "Not decided: too few manoeuvres to distinguish an effect from chance.",
         "adequate": f"The {first} is adequate: no effect that was tried predicts unfitted manoeuvres better.",
-        "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
+        "explained": f"The {first} lacks {effects}{_share(content)}; beside it nothing stands out from noise.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
         "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
         "unexplained": f"{_share_before(content, has)} a systematic misfit remains that no known effect accounts for."
