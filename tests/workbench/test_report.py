@@ -161,7 +161,7 @@ def test_every_word_agrees_with_the_verdict(
     text = " ".join(seen(html).text)
     headlines = {
         "adequate": "The plain model is adequate",
-        "explained": "The plain model lacks first-order rudder lag, which explains 26 % of the misfit one leg ahead; beside it",
+        "explained": "The plain model lacks first-order rudder lag, which explains 26 % of the misfit one leg ahead; ",
         "ambiguous": "The plain model lacks first-order rudder lag or bias of the rate gyro; these data cannot",
         "partly_explained": "The plain model lacks first-order rudder lag, which explains",
         "unexplained": "Not explained: a systematic misfit of the plain model remains",
