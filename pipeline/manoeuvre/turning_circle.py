@@ -7,13 +7,13 @@ IMO MSC.137(76), 4.2 and 5.3.1; ISO 13643-3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import degrees, pi
 
 import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
-from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
+from kempf.pipeline.manoeuvre.sailed import Reach, Sailed, reach_of, thinned
 from kempf.pipeline.manoeuvre.ship import Balance, Ship, Track
 from kempf.pipeline.segment.turning_figures import turning_figures
 
@@ -58,11 +58,13 @@ class TurningCircle:
             *(r[:, motion.TIME], r[:, motion.NORTH], r[:, motion.EAST], r[:, motion.HEADING]),
             *(np.hypot(forward, lateral), np.arctan2(-lateral, forward), 0.0),
         )
-        named = {name: getattr(figures, name) for name in FIGURES}
-        if self.turn_rad is None:
-            named |= _steady(ship, self.side, self.rudder_rad, track)
+        named, reach = {name: getattr(figures, name) for name in FIGURES}, reach_of(track, ship.waters.length_m)
+        balance = settled(ship, self.side, self.rudder_rad, track) if self.turn_rad is None else None
+        if balance is not None:
+            named |= _steady(balance, track)
+            reach = _as_far_as(balance, reach, ship.waters.length_m)
         curve = thinned(np.column_stack([r[:, motion.NORTH], self.side * r[:, motion.EAST]]))
-        return Sailed(named, curve, reach_of(track, ship.waters.length_m))
+        return Sailed(named, curve, reach)
 
 
 def turned(ship: Ship, side: int, rudder_rad: float, turn_rad: float | None = None) -> Track | None:
@@ -80,11 +82,8 @@ def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance |
     return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
 
 
-def _steady(ship: Ship, side: int, rudder_rad: float, track: Track) -> dict[str, float]:
-    """Return the steady figures of the turn that she comes to; none where that is not known."""
-    balance = settled(ship, side, rudder_rad, track)
-    if balance is None:
-        return {}
+def _steady(balance: Balance, track: Track) -> dict[str, float]:
+    """Return the steady figures of the turn that she comes to."""
     speed, before = np.hypot(balance.forward_m_s, balance.lateral_m_s), track.rows[0]
     return {
         "steady_diameter_m": float(2.0 * speed / abs(balance.yaw_rate_rad_s)),
@@ -92,3 +91,13 @@ def _steady(ship: Ship, side: int, rudder_rad: float, track: Track) -> dict[str,
         "steady_drift_deg": degrees(float(np.arctan2(-balance.lateral_m_s, balance.forward_m_s))),
         "speed_loss_percent": float(100.0 * (1.0 - speed / np.hypot(before[motion.FORWARD], before[motion.LATERAL]))),
     }
+
+
+def _as_far_as(balance: Balance, reach: Reach, length_m: float) -> Reach:
+    """Return how far out a turn goes that ends in a steady one."""
+    return replace(
+        reach,
+        drift_rad=max(reach.drift_rad, float(np.arctan2(abs(balance.lateral_m_s), balance.forward_m_s))),
+        yaw_rate=max(reach.yaw_rate, abs(balance.yaw_rate_rad_s) * length_m / balance.forward_m_s),
+        slowest_m_s=min(reach.slowest_m_s, balance.forward_m_s),
+    )

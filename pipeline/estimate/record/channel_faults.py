@@ -25,6 +25,7 @@ CODES = {
     ("sign", "heading"): "heading_sign",
     ("stuck", "heading"): "heading_stuck",
     ("stuck", "speed_through_water"): "speed_stuck",
+    ("leap", "heading"): "heading_leap",
     ("unit", "yaw_rate"): "yaw_rate_unit",
     ("sign", "yaw_rate"): "yaw_rate_sign",
     ("unit", "rudder_angle"): "rudder_unit",
@@ -100,8 +101,8 @@ def _refuse(finding: ChannelFinding) -> None:
 def _code(fault: Fault) -> str | None:
     """Return the code of a fault that makes the segment useless, None for one that is only warned of."""
     channel = fault.channels[0]
-    if fault.kind == "leap":
-        return "heading_leap" if abs(fault.value) > _LEAP_RAD else None
+    if fault.kind == "leap" and abs(fault.value) <= _LEAP_RAD:
+        return None
     if fault.kind == "offset" and fault.name.startswith("counted anticlockwise") and channel == "heading":
         return "heading_sign"
     code = CODES.get((fault.kind, channel))
