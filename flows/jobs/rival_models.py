@@ -99,9 +99,9 @@ def _against(found: Sequence[StoredDiagnosis], effects: Sequence[str]) -> tuple[
     left = [d for d in of_less if d.verdict in _LEFT]
     if not left:
         return ()
-    last = max(left, key=lambda d: d.diagnosis_id)
+    one = max(left, key=lambda d: d.diagnosis_id)
     return (
-        f"{last.diagnosis_id} says {last.verdict.replace('_', ' ')}: what no known effect explains is in no interval",
+        f"{one.diagnosis_id} says {one.verdict.replace('_', ' ')}: what no known effect explains is in no interval",
     )
 
 

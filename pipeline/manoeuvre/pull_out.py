@@ -43,7 +43,7 @@ class PullOut:
             forward, lateral, rate_rad_s = turn.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE]].tolist()
             start = Start(forward, lateral, rate_rad_s, order)
         else:
-            start = Start(balance.forward_m_s, balance.lateral_m_s, balance.yaw_rate_rad_s, order)
+            start = Start(balance.forward_m_s, balance.lateral_m_s, balance.yaw_rate_rad_s, balance.rudder_rad)
         track = replace(ship, waters=replace(ship.waters, start=start)).sail(
             np.array([[order, 0.0, 0.0, 0.0 if balance is None else _HELD * own], [nan, 0.0, 0.0, _WATCHED * own]])
         )

@@ -150,6 +150,12 @@ class Ship:
         rate, rudder = (given, float(z[1])) if rate_given else (float(z[1]), given)
         return Balance(rate, rudder, float(z[0]), float(forward), z)
 
+    def felt_rad(self, order_rad: float) -> float:
+        """Return the rudder that the hull feels once the reading has come to an order from amidships: short of play."""
+        kinds, sizes = self._gear()
+        play = 0.5 * float(np.sum(sizes[kinds == KINDS["backlash"]]))
+        return float(np.sign(order_rad)) * max(abs(order_rad) - play, 0.0)
+
     def _gear(self) -> tuple[NDArray[np.int64], Float]:
         parts = zip(self.waters.model.effects, self.waters.model.split(self.effects), strict=True)
         gear = [

@@ -78,7 +78,7 @@ def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance |
     """Return the steady turn that one comes to; None where there is none beside the end of it."""
     start = np.zeros(2 + ship.waters.model.extra)
     start[0], start[1] = track.rows[-1, motion.LATERAL], track.rows[-1, motion.RATE]
-    balance = ship.rate_by(side * rudder_rad, start)
+    balance = ship.rate_by(ship.felt_rad(side * rudder_rad), start)
     return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
 
 

@@ -54,7 +54,7 @@ def all_nan(value: np.ndarray) -> np.ndarray:
         (without(LOG, "speed_over_ground"), None, "channel_missing"),
         (valued("rudder_angle", lambda x: 0.0 * x + 0.01), None, "no_excitation"),
         (with_gap("rudder_angle", 100.0, 130.0), None, "rudder_gap"),
-        (valued("speed_through_water", lambda x: 0.0 * x), None, "no_speed"),
+        (valued("speed_through_water", lambda x: 0.0 * x), None, "speed_stuck"),
         (valued("heading", some_nan), None, "not_finite"),
         (valued("rudder_angle", some_nan), None, "not_finite"),
         (valued("yaw_rate", some_nan), None, "not_finite"),

@@ -120,3 +120,25 @@ def test_where_other_manoeuvres_are_chosen_by_now_none_is_fitted(
     found = rival_models.rivals_of(warehouse, own)
     assert not found.sets and "would rest on other manoeuvres" in found.remarks[0]
     assert found.remarks[0].startswith("yaw_v3 fits as well and is not among the models")
+
+
+@pytest.mark.parametrize(
+    ("effects", "verdict", "says"),
+    [
+        ((), "partly_explained", "dx-9 found that the model lacks cross_flow_drag or yaw_v3 and wind_force"),
+        (("yaw_v3",), "explained", "dx-9 found that the model lacks wind_force"),
+        (("yaw_v3", "wind_force"), "partly_explained", "dx-9 says partly explained: what no known effect explains"),
+        (("yaw_v3", "wind_force"), "explained", ""),
+    ],
+)
+def test_what_diagnoses_of_it_or_of_less_say_against_a_model(
+    tmp_path: Path, effects: tuple[str, ...], verdict: str, says: str, fitted: list[tuple[str, ...]]
+) -> None:
+    warehouse, own, plain = Warehouse(str(tmp_path / "w")), of_model(effects), of_model(())
+    parameter_sets.insert(warehouse, [own])
+    content = {"sets": [{"effects": ["cross_flow_drag", "yaw_v3"]}, {"effects": ["wind_force"]}]}
+    about = ("dx-9", plain.vessel, plain.parameter_set_id, plain.start_utc_ns, verdict, ("wind_force",))
+    assert diagnoses.insert(warehouse, StoredDiagnosis(*about, content, plain.provenance["inputs"], "c0de"))
+    against = rival_models.rivals_of(warehouse, own).against
+    assert len(against) == bool(says)
+    assert all(sentence.startswith(says) for sentence in against)

@@ -139,8 +139,13 @@ def test_every_command_answers_as_before(brought: Path) -> None:
         if command.startswith("vessels show"):
             assert answer.pop("partition", None) in (None, f"vessel_key={earlier_key(words[2])}")
             assert done.json["partition"] == f"vessel_key={vessel_key(words[2])}"
+        found = done.json
+        if command.startswith("doctor"):
+            # a later doctor looks at more
+            known = {check["check"] for check in answer["checks"]}
+            found["checks"] = [check for check in found["checks"] if check["check"] in known]
         # what is computed anew goes with the code of today, what is stored does not
-        same(done.json, answer, command, 0.02 if command.startswith("compare") else 1e-9)
+        same(found, answer, command, 0.02 if command.startswith("compare") else 1e-9)
 
 
 def same(found: Any, wanted: Any, where: str, within: float) -> None:
