@@ -6,7 +6,7 @@ with which she holds a straight course.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import degrees, nan
 
 import numpy as np
@@ -38,13 +38,11 @@ class PullOut:
         if turn is None:
             return None
         order, balance = side * self.rudder_rad, settled(ship, side, self.rudder_rad, turn)
-        if balance is None:
-            # one whose speed falls on and on comes out of the turn as she is after one and a half
-            forward, lateral, rate_rad_s = turn.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE]].tolist()
-            start = Start(forward, lateral, rate_rad_s, order)
-        else:
+        # one whose speed falls on and on comes out of the turn as she is after one and a half
+        start = Start.at_end_of(turn)
+        if balance is not None:
             start = Start(balance.forward_m_s, balance.lateral_m_s, balance.yaw_rate_rad_s, balance.rudder_rad)
-        track = replace(ship, waters=replace(ship.waters, start=start)).sail(
+        track = ship.beginning(start).sail(
             np.array([[order, 0.0, 0.0, 0.0 if balance is None else _HELD * own], [nan, 0.0, 0.0, _WATCHED * own]])
         )
         if track.how != motion.SAILED:

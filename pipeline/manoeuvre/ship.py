@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,11 @@ class Start:
     lateral_m_s: float | None = None
     yaw_rate_rad_s: float | None = None
     rudder_rad: float | None = None
+
+    @classmethod
+    def at_end_of(cls, track: Track) -> Start:
+        """Return the motion in which a manoeuvre ended, to go on from."""
+        return cls(*track.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE, motion.RUDDER]].tolist())
 
     def vector(self) -> Float:
         """Return it as the compiled motion reads it, shape (4,)."""
@@ -102,6 +107,10 @@ class Ship:
         """Whether a small turn to starboard is held by less rudder than the straight course: she turns by herself."""
         straight, turning = self.rudder_for(0.0), self.rudder_for(1e-3 / self.waters.own_time_s)
         return straight is not None and turning is not None and turning.rudder_rad < straight.rudder_rad
+
+    def beginning(self, start: Start) -> Ship:
+        """Return the ship that begins with a motion."""
+        return replace(self, waters=replace(self.waters, start=start))
 
     def _shared(self) -> tuple[Float, Float, Float, float, object, int]:
         w = self.waters

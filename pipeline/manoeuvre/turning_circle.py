@@ -14,13 +14,15 @@ import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Reach, Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Balance, Ship, Track
+from kempf.pipeline.manoeuvre.ship import Balance, Ship, Start, Track
 from kempf.pipeline.segment.turning_figures import turning_figures
 
 #: a ship that takes longer for a whole circle, in ship lengths on the approach, does not turn
 LONGEST = 400.0
 #: a steady turn whose yaw rate is farther off the one at the end of a turn, as a share of it, is another one
 _BESIDE = 0.5
+#: how long she swings about it at most, in ship lengths on the approach
+_SWINGS = 200.0
 #: the figures that are given
 FIGURES = (
     "advance_m",
@@ -76,9 +78,20 @@ def turned(ship: Ship, side: int, rudder_rad: float, turn_rad: float | None = No
 
 def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance | None:
     """Return the steady turn that one comes to; None where there is none beside the end of it."""
+    order = side * rudder_rad
+    balance = _beside(ship, order, track)
+    if balance is not None:
+        return balance
+    # a hull that slides swings about its steady turn for long, and the search for it loses its way from there
+    on = ship.beginning(Start.at_end_of(track)).sail(np.array([[order, 0.0, 0.0, _SWINGS * ship.waters.own_time_s]]))
+    return _beside(ship, order, on) if on.how == motion.SAILED else None
+
+
+def _beside(ship: Ship, order_rad: float, track: Track) -> Balance | None:
+    """Return the steady turn beside the motion at the end of a track."""
     start = np.zeros(2 + ship.waters.model.extra)
     start[0], start[1] = track.rows[-1, motion.LATERAL], track.rows[-1, motion.RATE]
-    balance = ship.rate_by(ship.felt_rad(side * rudder_rad), start)
+    balance = ship.rate_by(ship.felt_rad(order_rad), start)
     return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
 
 

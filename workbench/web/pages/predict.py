@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kempf.workbench.manoeuvre_figures import FIGURES, in_words, scaled
+from kempf.workbench.manoeuvre_figures import FIGURES, in_words
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.sailed import MANOEUVRES
 from kempf.workbench.web.desk import Desk
@@ -47,13 +47,18 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
 
 def _rows(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     # one that an earlier version made has no such key
-    scale = (prediction.get("full_scale") or {}).get("model_scale")
+    at_full_scale = (prediction.get("full_scale") or {}).get("figures", {})
     for name, entry in prediction["figures"].items():
         several = isinstance(entry, list)
         for place, figure in enumerate(entry if several else [entry]):
             words = in_words(name, place if several else None, prediction["manoeuvre"])
-            full = None if scale is None or figure["value"] is None else scaled(name, figure, scale)
-            yield {"words": words, "unit": FIGURES[name][1], **figure, "full": full}
+            full = at_full_scale.get(name)
+            yield {
+                "words": words,
+                "unit": FIGURES[name][1],
+                **figure,
+                "full": full[place] if full and several else full,
+            }
 
 
 def _measured(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
