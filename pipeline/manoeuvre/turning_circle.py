@@ -8,7 +8,7 @@ IMO MSC.137(76), 4.2 and 5.3.1; ISO 13643-3.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import degrees, pi
+from math import degrees, nan, pi
 
 import numpy as np
 
@@ -23,18 +23,9 @@ LONGEST = 400.0
 _BESIDE = 0.5
 #: how long she swings about it at most, in ship lengths on the approach
 _SWINGS = 200.0
-#: the figures that are given
-FIGURES = (
-    "advance_m",
-    "transfer_m",
-    "tactical_diameter_m",
-    "steady_diameter_m",
-    "steady_yaw_rate_deg_s",
-    "steady_drift_deg",
-    "speed_loss_percent",
-    "time_to_90_s",
-    "time_to_180_s",
-)
+#: the figures that are given; those of the steady turn
+_STEADY = ("steady_diameter_m", "steady_yaw_rate_deg_s", "steady_drift_deg", "speed_loss_percent")
+FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", *_STEADY, "time_to_90_s", "time_to_180_s")
 
 
 @dataclass(frozen=True)
@@ -61,10 +52,10 @@ class TurningCircle:
             *(np.hypot(forward, lateral), np.arctan2(-lateral, forward), 0.0),
         )
         named, reach = {name: getattr(figures, name) for name in FIGURES}, reach_of(track, ship.waters.length_m)
-        balance = settled(ship, self.side, self.rudder_rad, track) if self.turn_rad is None else None
-        if balance is not None:
+        if self.turn_rad is None:
+            balance = settled(ship, self.side, self.rudder_rad, track)
             named |= _steady(balance, track)
-            reach = _as_far_as(balance, reach, ship.waters.length_m)
+            reach = reach if balance is None else _as_far_as(balance, reach, ship.waters.length_m)
         curve = thinned(np.column_stack([r[:, motion.NORTH], self.side * r[:, motion.EAST]]))
         return Sailed(named, curve, reach)
 
@@ -95,8 +86,10 @@ def _beside(ship: Ship, order_rad: float, track: Track) -> Balance | None:
     return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
 
 
-def _steady(balance: Balance, track: Track) -> dict[str, float]:
-    """Return the steady figures of the turn that she comes to."""
+def _steady(balance: Balance | None, track: Track) -> dict[str, float]:
+    """Return the steady figures of the turn that she comes to; NaN where she comes to none."""
+    if balance is None:
+        return dict.fromkeys(_STEADY, nan)
     speed, before = np.hypot(balance.forward_m_s, balance.lateral_m_s), track.rows[0]
     return {
         "steady_diameter_m": float(2.0 * speed / abs(balance.yaw_rate_rad_s)),
