@@ -70,5 +70,6 @@ def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
     if place is None:
         return words
     if "orders_deg" in manoeuvre:
-        return f"{words} {manoeuvre['orders_deg'][place]:g} deg"
+        # no minus before a nought
+        return f"{words} {round(manoeuvre['orders_deg'][place], 1) + 0.0:g} deg"
     return f"{words} {place + 1}"

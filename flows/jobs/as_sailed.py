@@ -15,6 +15,7 @@ from kempf.flows.jobs.loads_of_logs import loads_beside
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.predicted import Predicted
 from kempf.flows.jobs.prediction_basis import Basis
+from kempf.flows.jobs.spiral_ways import orders_of
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
@@ -23,12 +24,14 @@ from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.began import Began, began
 from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.chain import F, R, V
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import notes
@@ -50,7 +53,8 @@ class AsSailed:
     speed_m_s: float
     #: The wind counted from the course of the approach.
     began: Began
-    #: Steady wind force of the manoeuvre and its standard error, as the filter finds it.
+    #: Steady wind force and its standard error: of a zigzag as the filter finds it; of any other, which no filter
+    #: passes, none with the size that it has in the zigzags of the set.
     wind_force_m_s2: tuple[float, float]
     arm_per_m: float
     #: ``fitted`` where the set was identified from it, ``held_out`` else.
@@ -75,7 +79,12 @@ class AsSailed:
         )
         # the gear is that of the logs, whatever other one a prediction was asked for
         own = replace(model, waters=waters, rudder_rate=basis.rudder_rate)
-        return replace(own, wind_force_std_m_s2=self.wind_force_m_s2[1], settled_std=std / ratio)
+        return replace(
+            own,
+            wind_force_std_m_s2=self.wind_force_m_s2[1],
+            start_std=self.began.start_std,
+            settled_std=std / ratio,
+        )
 
 
 def as_sailed(
@@ -92,23 +101,31 @@ def as_sailed(
     """
     zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, Zigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
+    usual = _usual_wind(predicted) if len(zigzags) < len(pairs) else (0.0, 0.0)
     sailed, logs = [], _Logs(warehouse)
     for done, (segment, manoeuvre) in enumerate(pairs):
         progress(done, len(pairs), f"reading {segment.segment_id}")
-        sailed.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id)))
+        wind = (0.0, 0.0) if isinstance(manoeuvre, Zigzag) else usual
+        sailed.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id), wind))
     progress(len(pairs), len(pairs), "read")
     return sailed
 
 
 def _one(
-    predicted: Predicted, manoeuvre: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None
+    predicted: Predicted,
+    manoeuvre: Manoeuvre,
+    segment: Segment,
+    log: Instruments,
+    run: RunFilter | None,
+    without_run: tuple[float, float],
 ) -> AsSailed:
     speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
     passed = _passed(run, predicted) if run else None
     executes = segment.executes_utc_ns or (segment.start_utc_ns,)
     beginning = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
     if run is not None:
-        beginning = replace(beginning, start=_start(run, passed, segment))
+        start, std = _start(run, passed, segment)
+        beginning = replace(beginning, start=start, start_std=replace(std, forward_m_s=beginning.start_std.forward_m_s))
     held = set(predicted.parameter_set.convergence.get("held_out") or ())
     fitted = segment.segment_id in predicted.parameter_set.segment_ids and segment.segment_id not in held
     return AsSailed(
@@ -116,11 +133,27 @@ def _one(
         manoeuvre=_as_ordered(manoeuvre, segment),
         speed_m_s=speed_m_s,
         began=beginning.counted_from(radians(segment.base_heading_deg)),
-        wind_force_m_s2=_steady_wind(run, passed) if run and passed else (0.0, 0.0),
-        arm_per_m=run.run.ship.arm_per_m if run else 0.0,
+        wind_force_m_s2=_steady_wind(run, passed) if run and passed else without_run,
+        arm_per_m=(run.run if run else predicted.basis.runs.runs[0]).ship.arm_per_m,
         sample="fitted" if fitted else "held_out",
         load=run.run.load if run else None,
     )
+
+
+def _usual_wind(predicted: Predicted) -> tuple[float, float]:
+    """Return no wind force, with the root mean square of those that the filter finds in the manoeuvres of the set.
+
+    A manoeuvre on which the set is not fitted has a wind of its own, from any side.
+    """
+    basis = predicted.basis
+    model = _with_its_noise(predicted)
+    squares = [0.0]
+    for run in basis.runs.runs:
+        one = RunFilter(run, model, basis.runs.spec)
+        passed = _passed(one, predicted)
+        force, std = _steady_wind(one, passed) if passed else (0.0, 0.0)
+        squares.append(force**2 + std**2)
+    return 0.0, float(np.sqrt(sum(squares) / max(len(squares) - 1, 1)))
 
 
 class _Logs:
@@ -143,8 +176,7 @@ def _runs(
     kept = tuple(segment for segment in chosen.segments if segment.segment_id in names)
     if not kept:
         return {}
-    basis, model = predicted.basis, predicted.prediction.models[0].model.waters.model
-    model, _ = with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))
+    basis, model = predicted.basis, _with_its_noise(predicted)
     # those of the set are laid out already
     own = {bounds: name for name, bounds in basis.bounds.items()}
     named = {s.segment_id: own.get(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in kept}
@@ -158,6 +190,12 @@ def _runs(
         if error.code != "no_runs":
             raise
     return {run.name: RunFilter(run, model, basis.runs.spec) for run in runs}
+
+
+def _with_its_noise(predicted: Predicted) -> EffectModel:
+    """Return the model of a set with the lasting noise that was found with it."""
+    model = predicted.prediction.models[0].model.waters.model
+    return with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))[0]
 
 
 def _beside_the_set(
@@ -188,11 +226,14 @@ def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
             manoeuvre, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: manoeuvre.overshoots + 1])
         )
     if isinstance(manoeuvre, Spiral):
-        return replace(manoeuvre, rudder_rad=rudder)
+        return replace(manoeuvre, rudder_rad=rudder, held_rad=tuple(map(radians, orders_of(segment))))
     if isinstance(manoeuvre, TurningCircle):
         # the steady figures are means over the last turn: of as many turns as were sailed
         turned = radians(abs(float(segment.detail["heading_change_deg"])))
         return replace(manoeuvre, side=side, rudder_rad=rudder, turn_rad=turned)
+    if isinstance(manoeuvre, PullOut):
+        after = float(segment.detail["rudder_after_deg"])
+        return replace(manoeuvre, side=side, rudder_rad=rudder, after_rad=radians(after))
     return replace(manoeuvre, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 
@@ -209,16 +250,17 @@ def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:
     return run.run_filter(model.hull, np.exp(own), values, states=True)
 
 
-def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> Start:
-    """Return with which speed, drift, turn and rudder a zigzag began."""
+def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> tuple[Start, Start]:
+    """Return with which speed, drift, turn and rudder a zigzag began, and standard errors as the filter has them."""
     executes = list(segment.detail.get("executes", ()))
     at = (executes[0]["time_utc_ns"] - run.run.start_utc_ns) / SECOND_NS if executes else 0.0
     speed = float(np.interp(at, run.run.time_s, run.run.speed_m_s))
     if passed is None or not np.all(np.isfinite(passed.states)):
-        return Start(forward_m_s=speed)
+        return Start(forward_m_s=speed), Start()
     lateral, rate = (float(np.interp(at, run.run.time_s, passed.states[:, i])) for i in (V, R))
+    errors = (float(np.sqrt(np.interp(at, run.run.time_s, passed.spread[:, i]))) for i in (V, R))
     rudder = radians(float(executes[0]["rudder_before_deg"])) if executes else None
-    return Start(speed, lateral, rate, rudder)
+    return Start(speed, lateral, rate, rudder), Start(None, *errors)
 
 
 def _steady_wind(run: RunFilter, passed: Passed) -> tuple[float, float]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import hypot, radians
+from math import degrees, hypot, radians
 from typing import Any
 
 from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
 from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.jobs.spiral_ways import rates_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.prediction import Figure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
@@ -73,11 +74,14 @@ class MeasuredManoeuvre:
     segment_id: str
     side: str
     speed_m_s: float
-    #: Steady wind of the manoeuvre, as the filter finds it.
+    #: wind_force_m_s2, wind_force_std_m_s2: Steady wind force of the manoeuvre and its standard error, see `AsSailed`.
     wind_force_m_s2: float
+    wind_force_std_m_s2: float
     #: ``fitted`` where the set was identified from it, ``held_out`` else.
     sample: str
     figures: tuple[Beside, ...]
+    #: Of a spiral: the rudder angles that it held, deg, as its figures are numbered.
+    orders_deg: tuple[float, ...] = ()
     #: Why there is no prediction; empty where there is one.
     why: str = ""
 
@@ -93,7 +97,8 @@ def measured_beside(
 
     Each is predicted with its own side, with the speed and the turn that it really began with, the shaft speed and the
     true wind of its log, and the rudder as it was held; a zigzag also in the steady wind that the filter finds, the
-    rudder ordered over at the headings at which it was, so that wind and helmsman are in both numbers.
+    rudder ordered over at the headings at which it was, so that wind and helmsman are in both numbers. Of any other the
+    intervals hold a wind force as large as in the zigzags of the set.
 
     Parameters
     ----------
@@ -145,17 +150,18 @@ def beside(predicted: Predicted, sailed: AsSailed) -> MeasuredManoeuvre:
     """Lay a prediction over one manoeuvre."""
     segment, basis = sailed.segment, predicted.basis
     models = [sailed.on_the_day(each.model, basis) for each in predicted.prediction.models]
-    about = (segment.segment_id, segment.first_side, sailed.speed_m_s, sailed.wind_force_m_s2[0], sailed.sample)
+    about = (segment.segment_id, segment.first_side, sailed.speed_m_s, *sailed.wind_force_m_s2, sailed.sample)
     try:
         prediction = predict(models, sailed.manoeuvre, basis.logs, basis.particulars, _DRAWS)
     except KempfError as error:
-        return MeasuredManoeuvre(*about, (), error.message)
+        return MeasuredManoeuvre(*about, (), why=error.message)
     figures = tuple(
         Beside(name, *_measured(figure), prediction.figures[name])
         for name, figure in figures_of(segment).items()
         if name in prediction.figures and _measured(figure)[0] is not None
     )
-    return MeasuredManoeuvre(*about, figures)
+    held = sailed.manoeuvre.orders_rad if isinstance(sailed.manoeuvre, Spiral) else ()
+    return MeasuredManoeuvre(*about, figures, tuple(round(degrees(angle), 3) for angle in held))
 
 
 def figures_of(segment: Segment) -> Mapping[str, Any]:
@@ -164,7 +170,7 @@ def figures_of(segment: Segment) -> Mapping[str, Any]:
         overshoots = segment.detail.get("overshoots", ())
         return {f"overshoots_deg.{o['number'] - 1}": o["beyond_nominal_deg"] for o in overshoots}
     figures: Mapping[str, Any] = segment.detail.get("figures", {})
-    return figures
+    return {**figures, **rates_of(segment)} if segment.kind == "spiral" else figures
 
 
 def _measured(figure: Any) -> tuple[Any, float | None, float | None]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 from kempf.pipeline.manoeuvre.ship import Start
 
@@ -17,6 +18,8 @@ Complex = NDArray[np.complex128]
 _PART, _LEAST_S = 0.25, 1.0
 #: instants at which what acts from then on is read
 _INSTANTS = 400
+#: of which the first that the log has shows the speed along the bow
+_SPEEDS = ("speed_through_water", "speed_over_ground")
 
 
 @dataclass(frozen=True)
@@ -24,6 +27,8 @@ class Began:
     """A beginning; None and 0 where the log does not show it."""
 
     start: Start
+    #: Standard errors of it, of the noise of single readings; None where the log does not show it.
+    start_std: Start
     #: Mean shaft speed from the first execute on.
     shaft_per_s: float | None
     #: wind_m_s, wind_from_rad: Mean true wind from the first execute on; from where, clockwise from north.
@@ -65,7 +70,21 @@ def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_ti
     air = np.column_stack([since, wind[known].real, wind[known].imag])
     shaft = _mean(_read(instruments, "shaft_speed", later))
     start = Start(forward_m_s=forward, yaw_rate_rad_s=rate)
-    return Began(start, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0])
+    speed = next((name for name in _SPEEDS if np.isfinite(_read(instruments, name, at)).any()), _SPEEDS[-1])
+    std = Start(
+        forward_m_s=_std(instruments, speed, before / SECOND_NS),
+        yaw_rate_rad_s=_std(instruments, "yaw_rate", before / SECOND_NS),
+    )
+    return Began(start, std, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0])
+
+
+def _std(instruments: Instruments, channel: str, over_s: float) -> float | None:
+    """Return the standard error of a mean over some time, None of a channel too short to say."""
+    series = instruments.get(channel)
+    noise = float("nan") if series is None else noise_std(series)
+    if series is None or not np.isfinite(noise):
+        return None
+    return noise / float(np.sqrt(max(over_s / series.period_s, 1.0)))
 
 
 def _mean(course: Float) -> float | None:
@@ -83,11 +102,11 @@ def _read(instruments: Instruments, channel: str, at: Nanoseconds) -> Float:
 
 def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
     """Return the speed along the bow, through the water where a log shows that, else over ground."""
-    water = _read(instruments, "speed_through_water", at)
+    water, over_ground = (_read(instruments, name, at) for name in _SPEEDS)
     if np.isfinite(water).any():
         return water
     away = _read(instruments, "course_over_ground", at) - _read(instruments, "heading", at)
-    speed: Float = _read(instruments, "speed_over_ground", at) * np.cos(away)
+    speed: Float = over_ground * np.cos(away)
     return speed
 
 

@@ -8,7 +8,7 @@ is always the same, so that a prediction is the same to the bit whenever it is m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from hashlib import sha256
 
 import numpy as np
@@ -17,7 +17,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.distributions import normal_quantile
 from kempf.pipeline.manoeuvre.own_zigzags import REFERENCE
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
-from kempf.pipeline.manoeuvre.ship import Ship, Waters
+from kempf.pipeline.manoeuvre.ship import Ship, Start, Waters
 from kempf.pipeline.manoeuvre.surge.surge_fit import SurgeFit
 from kempf.pipeline.model.ship import mariner_like
 
@@ -49,6 +49,8 @@ class Identified:
     conditioned: bool = False
     #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
     wind_force_std_m_s2: float = 0.0
+    #: Standard errors of `Waters.start`; None is none.
+    start_std: Start = field(default_factory=Start)
     #: Relative standard error of `Waters.settled_m_s`, where it is not the approach's.
     settled_std: float = 0.0
 
@@ -80,6 +82,7 @@ class Identified:
             surge=self.surge.sure,
             rudder_rate=replace(self.rudder_rate, std_rad_s=0.0),
             wind_force_std_m_s2=0.0,
+            start_std=Start(),
             settled_std=0.0,
         )
 
@@ -103,8 +106,8 @@ class Identified:
         theta = np.concatenate([self.hull, self.effects]) + normal[:, : 6 + p] @ _root(self.covariance).T
         low, high = self.waters.model.low, self.waters.model.high
         # numbers of their own, so that hull and effects are drawn alike whatever costs her speed
-        beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((4, count))
-        of_the_day, more = beside[:2], beside[2:].T
+        beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((7, count))
+        of_the_day, more, beginning = beside[:2], beside[2:4].T, beside[4:].T
         surge = self.surge_here.drawn(np.hstack([normal[:, 6 + p : 9 + p], more]))
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
@@ -112,7 +115,7 @@ class Identified:
         wind, settled = self.wind_force_std_m_s2 * of_the_day[0], 1.0 + self.settled_std * of_the_day[1]
         for k in range(count):
             values = np.clip(theta[k, 6:], low, high)
-            waters = self.waters
+            waters = replace(self.waters, start=self.waters.start.off_by(self.start_std, beginning[k]))
             if wind[k] != 0.0:
                 waters = replace(waters, wind_force_m_s2=waters.wind_force_m_s2 + float(wind[k]))
             if waters.settled_m_s is not None:

@@ -19,6 +19,8 @@ from kempf.pipeline.manoeuvre.turning_circle import settled, turned
 #: how long the steady turn is held, so that what effects remember is that of the turn, and how long she is watched
 #: then, in ship lengths on the approach; the end of it, over which what is left is averaged
 _HELD, _WATCHED, _END = 10.0, 60.0, 10.0
+#: a rate that is left, as a share of the turn's, below which it is none but what the integration leaves
+_NOTHING = 1e-5
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class PullOut:
     rudder_rad: float
     #: +1 to starboard, -1 to port.
     side: int = 1
+    #: Rudder afterwards, starboard positive; None for that of a straight course.
+    after_rad: float | None = None
     name: str = "pull-out"
 
     def sailed(self, ship: Ship) -> Sailed | None:
@@ -37,13 +41,14 @@ class PullOut:
         turn = turned(ship, side, self.rudder_rad)
         if turn is None:
             return None
+        after = nan if self.after_rad is None else self.after_rad
         order, balance = side * self.rudder_rad, settled(ship, side, self.rudder_rad, turn)
         # one whose speed falls on and on comes out of the turn as she is after one and a half
         start = Start.at_end_of(turn)
         if balance is not None:
             start = Start(balance.forward_m_s, balance.lateral_m_s, balance.yaw_rate_rad_s, balance.rudder_rad)
         track = ship.beginning(start).sail(
-            np.array([[order, 0.0, 0.0, 0.0 if balance is None else _HELD * own], [nan, 0.0, 0.0, _WATCHED * own]])
+            np.array([[order, 0.0, 0.0, 0.0 if balance is None else _HELD * own], [after, 0.0, 0.0, _WATCHED * own]])
         )
         if track.how != motion.SAILED:
             return None
@@ -52,10 +57,13 @@ class PullOut:
         time = time - time[0]
         last = time >= time[-1] - _END * own
         steady, left = float(rate[0]), float(np.mean(rate[last]))
+        # what the integration ends with is no rate
+        left = 0.0 if abs(left) < _NOTHING * abs(steady) else left
         below = np.flatnonzero(rate <= 0.5 * steady)
         figures = {
             "steady_yaw_rate_deg_s": side * degrees(steady),
-            "residual_yaw_rate_deg_s": side * degrees(left),
+            # no minus before a nought
+            "residual_yaw_rate_deg_s": side * degrees(left) + 0.0,
             "residual_share_percent": 100.0 * left / steady,
             "time_to_half_s": float(time[below[0]]) if below.size else nan,
         }

@@ -32,6 +32,15 @@ class Start:
         """Return the motion in which a manoeuvre ended, to go on from."""
         return cls(*track.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE, motion.RUDDER]].tolist())
 
+    def off_by(self, std: Start, normal: Float) -> Start:
+        """Return it with errors of its speeds and turn: standard errors times normal numbers, shape (3,)."""
+        names = ("forward_m_s", "lateral_m_s", "yaw_rate_rad_s")
+        errors = {name: (getattr(std, name) or 0.0) * float(number) for name, number in zip(names, normal, strict=True)}
+        return replace(
+            self,
+            **{name: getattr(self, name) + error for name, error in errors.items() if getattr(self, name) is not None},
+        )
+
     def vector(self) -> Float:
         """Return it as the compiled motion reads it, shape (4,)."""
         parts = (self.forward_m_s, self.lateral_m_s, self.yaw_rate_rad_s, self.rudder_rad)

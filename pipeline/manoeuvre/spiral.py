@@ -31,6 +31,8 @@ class Spiral:
     rudder_rad: float
     #: Step of the direct spiral between them.
     step_rad: float = radians(5.0)
+    #: Rudder angles from starboard to port that are held instead, as of a spiral that was sailed.
+    held_rad: tuple[float, ...] = ()
     name: str = "spiral"
 
     def sailed(self, ship: Ship) -> Sailed | None:
@@ -67,6 +69,8 @@ class Spiral:
     @property
     def orders_rad(self) -> Float:
         """Rudder angles of the direct spiral, from starboard to port."""
+        if self.held_rad:
+            return np.array(self.held_rad)
         steps = round(self.rudder_rad / self.step_rad)
         angles = np.unique([*(self.step_rad * np.arange(steps)), self.rudder_rad])
         orders: Float = np.concatenate([angles[::-1], -angles[1:]])

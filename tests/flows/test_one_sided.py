@@ -14,7 +14,7 @@ from kempf.pipeline.manoeuvre.prediction import Figure
 def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> MeasuredManoeuvre:
     """One that was sailed to starboard and to port in turn: name, measured and predicted of each figure."""
     every = tuple(Beside(name, there, None, None, within(value, 0.05)) for name, there, value in figures)
-    return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, "held_out", every)
+    return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, 0.0, "held_out", every)
 
 
 def within(value: float | None, share: float) -> Figure:

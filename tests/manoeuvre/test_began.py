@@ -34,6 +34,21 @@ def test_the_wind_is_read_as_a_course_and_counted_from_the_approach() -> None:
     np.testing.assert_allclose(turned.air[-1], [140.0, 8.0, 0.0], atol=1e-9)
 
 
+def test_a_beginning_is_as_unsure_as_its_readings() -> None:
+    rng = np.random.default_rng(5)
+    noise = rng.normal(0.0, 1.0, (2, 400))
+    log = log_of(speed_through_water=3.0 + 0.1 * noise[0], yaw_rate=1e-3 * noise[1])
+    seen = began(log, 300 * SECOND_NS, 390 * SECOND_NS, 64.0)
+    # sixteen readings
+    assert seen.start_std.forward_m_s == pytest.approx(0.025, rel=0.2)
+    assert seen.start_std.yaw_rate_rad_s == pytest.approx(2.5e-4, rel=0.2)
+    assert seen.start.forward_m_s == pytest.approx(3.0, abs=0.075)
+    off = seen.start.off_by(seen.start_std, np.array([1.0, 1.0, -1.0]))
+    assert off.forward_m_s == pytest.approx(seen.start.forward_m_s + seen.start_std.forward_m_s)
+    assert off.yaw_rate_rad_s == pytest.approx(seen.start.yaw_rate_rad_s - seen.start_std.yaw_rate_rad_s)
+    assert (off.lateral_m_s, off.rudder_rad) == (None, None)
+
+
 def test_a_log_without_wind_has_none() -> None:
     seen = began(log_of(speed_through_water=np.full(200, 3.0)), 50 * SECOND_NS, 190 * SECOND_NS, 10.0)
     assert seen.wind_m_s == 0.0

@@ -16,12 +16,13 @@ from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
-from kempf.pipeline.segment.spiral import Spiral
+from kempf.pipeline.segment.spiral import Spiral, SpiralPoint
 from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, direct_spiral
 from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn
+from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
 from tests.segment.nomoto import Instruments, Ship, measure
 from tests.segment.sailed import START_NS, instruments, sailed, true_circle
 
@@ -94,6 +95,36 @@ def test_of_one_turn_the_water_log_shows_the_current(hull: str, rudder: float, t
     without = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
     assert not without.measured.corrected
     assert without.measured.drift is None
+
+
+@pytest.mark.parametrize(("hull", "hold_s"), [("ferry", 80.0), ("mariner", 120.0), ("container", 100.0)])
+@pytest.mark.parametrize("environment", [CALM, PAPER_ENVIRONMENT])
+def test_a_stable_ship_that_lags_behind_short_steps_has_no_loop(
+    hull: str, hold_s: float, environment: Environment
+) -> None:
+    steps = direct_spiral((20.0, 15.0, 10.0, 5.0, 0.0, -5.0, -10.0, -15.0, -20.0), hold_s)
+    trial = sailed((SteadyCourse(200.0), *steps, SteadyCourse(200.0)), hull, environment, seed=4)
+    (spiral,) = find_turning(instruments(trial))
+    assert isinstance(spiral, Spiral)
+    assert (spiral.loop, spiral.n_ways) == ("none seen", 2)
+    # at the same rudder she comes to the same rate from either side
+    by_rudder: dict[int, list[SpiralPoint]] = {}
+    for point in spiral.points[1:-1]:
+        by_rudder.setdefault(round(point.rudder_deg), []).append(point)
+    pairs = [pair for pair in by_rudder.values() if len(pair) == 2]
+    assert len(pairs) == 7
+    for one, other in pairs:
+        off = abs((one.yaw_rate_deg_s.value or 0.0) - (other.yaw_rate_deg_s.value or 0.0))
+        assert off < 3.0 * np.hypot(one.yaw_rate_deg_s.std, other.yaw_rate_deg_s.std)
+
+
+def test_an_unstable_ship_has_a_loop() -> None:
+    steps = direct_spiral((20.0, 15.0, 10.0, 5.0, 0.0, -5.0, -10.0, -15.0, -20.0), 300.0)
+    trial = sailed((SteadyCourse(200.0), *steps, SteadyCourse(200.0)), "tanker", seed=4)
+    (spiral,) = find_turning(instruments(trial))
+    assert isinstance(spiral, Spiral) and spiral.loop == "seen"
+    height = spiral.figures["loop_height_deg_s"]
+    assert height.low is not None and height.low > 1.0
 
 
 def test_noise_of_the_log_is_no_current() -> None:

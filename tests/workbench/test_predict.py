@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
 import yaml
 
 from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
+from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, TurningCircle
-from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
+from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, TrialSettings, simulate_trial
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
@@ -94,11 +96,40 @@ def test_overshoots_are_a_list_and_lie_beside_the_measured_ones(warehouse: Path)
     first = measured[0]["figures"][0]
     assert first["measured"] == pytest.approx(first["value"], abs=4.0)
     table = predicted(warehouse, "zigzag", "--compare").out
-    assert "measured, and predicted with its own approach speed" in table
+    assert "measured, and predicted as each was sailed" in table
+    # the wind of a zigzag is found in it
+    assert measured[0]["wind_force_m_s2"] != 0.0
+    assert "wind force of these" not in table
     assert "not compared" not in table
     none = predicted(warehouse, "zigzag", "--angles", "5/5", "--compare").out
     assert "not compared, as they are of other angles: 1 with --angles 20/20" in " ".join(none.split())
     assert "no manoeuvre of this kind" in none
+
+
+def test_a_circle_sailed_in_the_wind_lies_within_what_the_wind_of_the_zigzags_does(
+    warehouse: Path, mariner: Ship, tmp_path: Path
+) -> None:
+    place, logs = copytree(warehouse, tmp_path / "warehouse"), mariner.write(tmp_path / "logs")
+    programme = (SteadyCourse(300.0), TurningCircle(-35.0, 560.0), SteadyCourse(60.0))
+    settings = TrialSettings(
+        HULLS["mariner"], programme, PAPER_ENVIRONMENT, seed=21, start_utc_ns=1_750_100_000 * 10**9
+    )
+    (logs / "circle.csv.gz").write_bytes(to_csv(simulate_trial(settings)))
+    assert kempf("ingest", logs / "circle.csv.gz", "--profile", logs / "profile.yaml", "--warehouse", place).code == 0
+    shown = predicted(place, "turning-circle", "--compare", "--json").json
+    (measured,) = shown["measured"]
+    assert measured["sample"] == "held_out" and measured["side"] == "port"
+    # of the simulator's force, and it wanders by 1e-3
+    assert measured["wind_force_m_s2"] == 0.0
+    assert measured["wind_force_std_m_s2"] == pytest.approx(PAPER_ENVIRONMENT.wind_force.mean, rel=0.5)
+    figures = {one["figure"]: one for one in measured["figures"]}
+    assert {"advance_m", "transfer_m", "tactical_diameter_m", "steady_yaw_rate_deg_s"} <= set(figures)
+    assert all(one["agrees"] for one in figures.values()), figures
+    assert any("wind force of these is not known" in words for words in shown["judged"])
+    # in calm water none of them is as wide
+    for name, figure in shown["figures"].items():
+        if name in ("transfer_m", "tactical_diameter_m"):
+            assert figures[name]["high"] - figures[name]["low"] > 2.0 * (figure["high"] - figure["low"])
 
 
 def test_a_model_is_predicted_at_full_scale_too(warehouse: Path, mariner: Ship, tmp_path: Path) -> None:

@@ -205,16 +205,16 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         for beside in run.figures:
             figure = beside.predicted
             base, _, place = beside.name.partition(".")
-            words = in_words(base, int(place) if place else None, {})
+            words = in_words(
+                base, int(place) if place else None, {"orders_deg": run.orders_deg} if run.orders_deg else {}
+            )
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
                 about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)
                 verdict = "yes" if beside.inside else "by both" if beside.agrees else "no"
                 rows.append([*about, _with_half(beside), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
-    print_table(
-        head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
-    )
+    print_table(head, rows, "measured, and predicted as each was sailed: its own beginning, rudder, headings and wind")
     for sentence in judged(measured):
         print_paragraph(sentence)
     for found in one_sided(measured):

@@ -33,13 +33,20 @@ def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     widths = [
         0.5 * (one.high - one.low) / abs(one.value)
         for one in predicted
-        if one.value and one.low is not None and one.high is not None
+        # of one about nothing there is no share
+        if one.value and one.low is not None and one.high is not None and one.low * one.high > 0.0
     ]
     sentences = [first]
     if widths:
         sentences.append(
             f"half an interval is {_percent(median(widths))} % of what is predicted in the median, "
             f"{_percent(max(widths))} % at most"
+        )
+    unknown = max((run.wind_force_std_m_s2 for run in measured if run.wind_force_m_s2 == 0.0), default=0.0)
+    if unknown > 0.0:
+        sentences.append(
+            f"the wind force of these is not known: the intervals hold one of {unknown:.2g} m/s^2 to either side (one "
+            "standard error), as large as in the zigzags of the set"
         )
     if agree < _MOST * len(figures):
         sentences.append(_LACKS)

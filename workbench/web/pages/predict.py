@@ -63,9 +63,11 @@ def _rows(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _measured(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for manoeuvre in prediction["measured"]:
+        # one that an earlier version made has no orders
+        orders = {"orders_deg": manoeuvre["orders_deg"]} if manoeuvre.get("orders_deg") else {}
         for figure in manoeuvre["figures"]:
             name, _, place = figure["figure"].partition(".")
-            words = in_words(name, int(place) if place else None, prediction["manoeuvre"])
+            words = in_words(name, int(place) if place else None, orders)
             yield {
                 **figure,
                 "words": words,
