@@ -63,7 +63,7 @@ def circles(hull: SimulatedHull, number: int, folder: Path) -> Path:
     """Sail the circles and write their log."""
     steps = [SteadyCourse(180.0)]
     for rudder_deg in RUDDERS_DEG:
-        steps += [TurningCircle(rudder_deg, 560.0), SteadyCourse(400.0)]
+        steps += [TurningCircle(rudder_deg, 560.0), SteadyCourse(900.0)]
     settings = TrialSettings(
         hull, tuple(steps), environment(number), seed=_SEED + number, start_utc_ns=1_760_000_000 * 10**9
     )

@@ -19,7 +19,7 @@ from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.nominal import RUDDER_TOLERANCE, nominal_angle
 from kempf.pipeline.segment.ramps import measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
-from kempf.pipeline.segment.yaw_rate import MeanYawRate, mean_yaw_rate
+from kempf.pipeline.segment.yaw_rate import MeanYawRate, mean_yaw_rate, settling_rate
 from kempf.pipeline.segment.zigzag import Side
 
 #: What a pair of pull-outs says about the ship on a straight course.
@@ -105,9 +105,9 @@ def pull_out(signals: Signals, turn: HeldRudder, after: HeldRudder, settings: Se
     in_time = after.start_s - turn.end_s <= _SHORTEST * quarter_s <= end_s - after.start_s
     if not in_time or signals.longest_gap_s(turn.end_s, end_s) > settings.gap_share * quarter_s:
         return None
-    residual = mean_yaw_rate(signals, end_s - _LAST_PART * (end_s - after.start_s), end_s)
-    settled = abs(residual.change) <= _STEADY_END * abs(initial.value)
-    if not settled and residual.value / initial.value > 0.5:
+    residual = settling_rate(signals, after.start_s, end_s)
+    settled = residual.on_the_way or abs(residual.last.change) <= _STEADY_END * abs(initial.value)
+    if not settled and residual.last.value / initial.value > 0.5:
         return None
     ramp = measure_ramp(
         signals.rudder_s,
@@ -121,8 +121,7 @@ def pull_out(signals: Signals, turn: HeldRudder, after: HeldRudder, settings: Se
     start_s = turn.end_s if ramp is None else ramp.start_s
     why = "the rate was still changing when the rudder left midships"
     measured = abs(float(np.rad2deg(turn.rudder)))
-    # what is left of the decay is part of the error
-    left, left_std = np.rad2deg(residual.value), np.rad2deg(np.hypot(residual.std, residual.change))
+    left, left_std = np.rad2deg(residual.comes_to), np.rad2deg(residual.comes_to_std)
     return PullOut(
         side="starboard" if turn.rudder > 0 else "port",
         delta0_deg=nominal_angle(measured, 0.0, RUDDER_TOLERANCE),

@@ -18,7 +18,7 @@ from kempf.pipeline.segment.figure import Figure
 from kempf.pipeline.segment.held_rudder import HeldRudder, band
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.settings import SegmentSettings
-from kempf.pipeline.segment.yaw_rate import MeanYawRate, mean_yaw_rate
+from kempf.pipeline.segment.yaw_rate import settling_rate
 from kempf.pipeline.segment.zigzag import Side
 
 #: Whether the way there and the way back differ.
@@ -32,10 +32,6 @@ _SHORT_SHARE, _MOVING_SHARE = 0.1, 0.5
 
 #: Largest change of the rate in the last third of a hold, as a share of the largest rate.
 _STEADY_SHARE = 0.1
-#: Smallest change from one third of a hold to the next, in standard errors, that shows how the rate goes on; largest
-#: one, as a share of the change before: what hardly slows down does not say where it comes to. Error of where it comes
-#: to, as a share of what is still missing.
-_MOVES_ERRORS, _SLOWS, _MISSING_SHARE = 2.0, 0.8, 0.5
 
 #: Smallest share of steps whose rate became steady.
 _STEADY_STEPS = 0.7
@@ -166,26 +162,25 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
     first, last = ways[0][0], ways[-1][1]
     holds = chain[first : last + 1]
     begin_s, end_s = max(holds[0].start_s, float(signals.heading_s[0])), min(holds[-1].end_s, signals.heading_s[-1])
-    thirds = [_by_thirds(signals, max(hold.start_s, begin_s), min(hold.end_s, end_s)) for hold in holds]
-    rates = [last for _, _, last in thirds]
-    largest = max(abs(rate.value) for rate in rates)
-    steady = [abs(rate.change) <= _STEADY_SHARE * largest for rate in rates]
+    rates = [settling_rate(signals, max(hold.start_s, begin_s), min(hold.end_s, end_s)) for hold in holds]
+    largest = max(abs(rate.last.value) for rate in rates)
+    steady = [abs(rate.last.change) <= _STEADY_SHARE * largest for rate in rates]
     if not np.mean(steady) >= _STEADY_STEPS:
         return None
     outermost = [k - first for way in ways for k in way]
-    if not all(holds[k].rudder * rates[k].value > 0 for k in outermost):
+    if not all(holds[k].rudder * rates[k].last.value > 0 for k in outermost):
         return None
-    if not all(abs(rates[k].value) * holds[k].duration_s >= _TURNED_RAD for k in outermost):
+    if not all(abs(rates[k].last.value) * holds[k].duration_s >= _TURNED_RAD for k in outermost):
         return None
     points = tuple(
         SpiralPoint(
             rudder_deg=float(np.rad2deg(hold.rudder)),
-            yaw_rate_deg_s=_come_to(*rates_of),
+            yaw_rate_deg_s=Figure.of(degrees(rate.comes_to), degrees(rate.comes_to_std)),
             steady=at_rest,
             start_utc_ns=signals.utc_ns(hold.start_s),
             end_utc_ns=signals.utc_ns(hold.end_s),
         )
-        for hold, rates_of, at_rest in zip(holds, thirds, steady, strict=True)
+        for hold, rate, at_rest in zip(holds, rates, steady, strict=True)
     )
     parts = [points[a - first : b - first + 1] for a, b in ways]
     loop, figures = _loop(parts, float(np.rad2deg(band(0.0, signals.rudder_noise))))
@@ -205,25 +200,6 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
         figures=figures,
         reasons=tuple(reasons),
     )
-
-
-def _by_thirds(signals: Signals, start_s: float, end_s: float) -> tuple[MeanYawRate, MeanYawRate, MeanYawRate]:
-    borders = np.linspace(start_s, end_s, 4).tolist()
-    first, second, third = (mean_yaw_rate(signals, *border) for border in pairwise(borders))
-    return first, second, third
-
-
-def _come_to(first: MeanYawRate, second: MeanYawRate, last: MeanYawRate) -> Figure:
-    """Return the rate to which a hold comes, from the means of its thirds, deg/s.
-
-    What is missing dies away exponentially, so that the changes from third to third are a geometric series. A stable
-    ship whose steps are short lags behind her rudder on both ways, which else looks like the loop of an unstable one.
-    """
-    before, now = second.value - first.value, last.value - second.value
-    if before * now > 0.0 and abs(now) < _SLOWS * abs(before) and abs(now) > _MOVES_ERRORS * last.std:
-        missing = now * now / (before - now)
-        return Figure.of(degrees(last.value + missing), degrees(float(np.hypot(last.std, _MISSING_SHARE * missing))))
-    return Figure.of(degrees(last.value), degrees(float(np.hypot(last.std, last.change))))
 
 
 def _loop(ways: list[tuple[SpiralPoint, ...]], same_deg: float) -> tuple[Loop, dict[str, Figure]]:

@@ -6,6 +6,7 @@ The compass is taken rather than the rate gyro: the bias of a gyro is as large a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from kempf.pipeline.segment.measured import Signals
 
 #: Parts into which the while is divided.
 _PARTS = 4
+#: Smallest change from one third of a while to the next, in standard errors, that shows how the rate goes on; largest
+#: one, as a share of the change before: what hardly slows down does not say where it comes to. Error of where it comes
+#: to, as a share of what is still missing.
+_MOVES_ERRORS, _SLOWS, _MISSING_SHARE = 2.0, 0.8, 0.5
 
 
 @dataclass(frozen=True)
@@ -52,3 +57,42 @@ def mean_yaw_rate(signals: Signals, start_s: float, end_s: float) -> MeanYawRate
         float(np.std(rates, ddof=1) / np.sqrt(_PARTS)),
         float(rates[-1] - rates[0]),
     )
+
+
+@dataclass(frozen=True)
+class SettlingRate:
+    """A yaw rate that dies down, or grows, to a steady one."""
+
+    #: Of the last third of the while.
+    last: MeanYawRate
+    #: comes_to, comes_to_std: The steady rate and its standard error, rad/s.
+    comes_to: float
+    comes_to_std: float
+    #: Whether it was still on the way, and how, so that what was missing is in ``comes_to``.
+    on_the_way: bool
+
+
+def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRate:
+    """Measure the yaw rate to which a ship comes with the rudder that she holds.
+
+    What is missing dies away exponentially, so that the changes of the mean from third to third are a geometric series,
+    of which the rest is added to the last. A stable ship that is not given the time lags behind her rudder, and the
+    same rudder has two rates, which looks like the loop of an unstable one. Where the changes are lost in the noise or
+    do not become smaller, the mean of the last third is the rate, with its change as an error.
+
+    Parameters
+    ----------
+    signals : Signals
+        Heading and rudder.
+    start_s, end_s : float
+        From when to when the rudder is held, s; within the record.
+    """
+    borders = np.linspace(start_s, end_s, 4).tolist()
+    first, second, last = (mean_yaw_rate(signals, *border) for border in pairwise(borders))
+    before, now = second.value - first.value, last.value - second.value
+    # written so that NaN fails
+    if before * now > 0.0 and _MOVES_ERRORS * last.std < abs(now) < _SLOWS * abs(before):
+        missing = now * now / (before - now)
+        std = float(np.hypot(last.std, _MISSING_SHARE * missing))
+        return SettlingRate(last, last.value + missing, std, on_the_way=True)
+    return SettlingRate(last, last.value, float(np.hypot(last.std, last.change)), on_the_way=False)

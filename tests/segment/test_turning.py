@@ -118,6 +118,20 @@ def test_a_stable_ship_that_lags_behind_short_steps_has_no_loop(
         assert off < 3.0 * np.hypot(one.yaw_rate_deg_s.std, other.yaw_rate_deg_s.std)
 
 
+@pytest.mark.parametrize(("hull", "hold_s"), [("ferry", 120.0), ("mariner", 170.0), ("container", 160.0)])
+def test_the_rate_that_is_left_is_the_one_that_she_comes_to(hull: str, hold_s: float) -> None:
+    pull_out = HeldRudder(0.0, hold_s)
+    programme = (SteadyCourse(200.0), Turn(15.0, 400.0), pull_out, SteadyCourse(400.0), Turn(-15.0, 400.0), pull_out)
+    trial = sailed((*programme, SteadyCourse(200.0)), hull, PAPER_ENVIRONMENT, seed=1)
+    found = [one for one in find_turning(instruments(trial)) if isinstance(one, PullOut)]
+    assert [one.verdict for one in found] == ["no instability seen"] * 2
+    for one in found:
+        left, initial = one.figures["residual_yaw_rate_deg_s"], one.figures["initial_yaw_rate_deg_s"]
+        assert left.value is not None and initial.value is not None
+        # the wind turns her by less than a tenth of a degree a second
+        assert abs(left.value) < 0.1 + 2.0 * left.std < 0.4 * abs(initial.value)
+
+
 def test_an_unstable_ship_has_a_loop() -> None:
     steps = direct_spiral((20.0, 15.0, 10.0, 5.0, 0.0, -5.0, -10.0, -15.0, -20.0), 300.0)
     trial = sailed((SteadyCourse(200.0), *steps, SteadyCourse(200.0)), "tanker", seed=4)
