@@ -36,7 +36,7 @@ _STEADY_TURN, _STEADY_END = 0.2, 0.1
 
 #: How long the rudder is held amidships, in times of a heading change of 90 deg at the rate of the turn: at least, and
 #: as far as it is looked at.
-_SHORTEST, _LONGEST = 0.5, 4.0
+_SHORTEST, _LONGEST = 0.5, 8.0
 
 #: Part of the hold at whose end the rate is taken.
 _LAST_PART = 1.0 / 3.0

@@ -18,7 +18,7 @@ _PARTS = 4
 #: Smallest change from one third of a while to the next, in standard errors, that shows how the rate goes on; largest
 #: one, as a share of the change before: what hardly slows down does not say where it comes to. Error of where it comes
 #: to, as a share of what is still missing.
-_MOVES_ERRORS, _SLOWS, _MISSING_SHARE = 2.0, 0.8, 0.5
+_MOVES_ERRORS, _SLOWS, _MISSING_SHARE = 2.0, 0.95, 1.0
 
 
 @dataclass(frozen=True)
@@ -77,8 +77,9 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
 
     What is missing dies away exponentially, so that the changes of the mean from third to third are a geometric series,
     of which the rest is added to the last. A stable ship that is not given the time lags behind her rudder, and the
-    same rudder has two rates, which looks like the loop of an unstable one. Where the changes are lost in the noise or
-    do not become smaller, the mean of the last third is the rate, with its change as an error.
+    same rudder has two rates, which looks like the loop of an unstable one. Where the changes are lost in the noise the
+    mean of the last third is the rate, with its change as an error; where they do not become smaller nobody knows to
+    what she comes, and the error is what would be missing if they hardly did.
 
     Parameters
     ----------
@@ -91,8 +92,12 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
     first, second, last = (mean_yaw_rate(signals, *border) for border in pairwise(borders))
     before, now = second.value - first.value, last.value - second.value
     # written so that NaN fails
-    if before * now > 0.0 and _MOVES_ERRORS * last.std < abs(now) < _SLOWS * abs(before):
+    moves = before * now > 0.0 and abs(now) > _MOVES_ERRORS * last.std
+    if moves and abs(now) < _SLOWS * abs(before):
         missing = now * now / (before - now)
         std = float(np.hypot(last.std, _MISSING_SHARE * missing))
         return SettlingRate(last, last.value + missing, std, on_the_way=True)
+    if moves:
+        missing = now * _SLOWS / (1.0 - _SLOWS)
+        return SettlingRate(last, last.value, float(np.hypot(last.std, missing)), on_the_way=False)
     return SettlingRate(last, last.value, float(np.hypot(last.std, last.change)), on_the_way=False)

@@ -118,7 +118,7 @@ def test_a_stable_ship_that_lags_behind_short_steps_has_no_loop(
         assert off < 3.0 * np.hypot(one.yaw_rate_deg_s.std, other.yaw_rate_deg_s.std)
 
 
-@pytest.mark.parametrize(("hull", "hold_s"), [("ferry", 120.0), ("mariner", 170.0), ("container", 160.0)])
+@pytest.mark.parametrize(("hull", "hold_s"), [("ferry", 220.0), ("mariner", 340.0), ("container", 320.0)])
 def test_the_rate_that_is_left_is_the_one_that_she_comes_to(hull: str, hold_s: float) -> None:
     pull_out = HeldRudder(0.0, hold_s)
     programme = (SteadyCourse(200.0), Turn(15.0, 400.0), pull_out, SteadyCourse(400.0), Turn(-15.0, 400.0), pull_out)
@@ -130,15 +130,6 @@ def test_the_rate_that_is_left_is_the_one_that_she_comes_to(hull: str, hold_s: f
         assert left.value is not None and initial.value is not None
         # the wind turns her by less than a tenth of a degree a second
         assert abs(left.value) < 0.1 + 2.0 * left.std < 0.4 * abs(initial.value)
-
-
-def test_an_unstable_ship_has_a_loop() -> None:
-    steps = direct_spiral((20.0, 15.0, 10.0, 5.0, 0.0, -5.0, -10.0, -15.0, -20.0), 300.0)
-    trial = sailed((SteadyCourse(200.0), *steps, SteadyCourse(200.0)), "tanker", seed=4)
-    (spiral,) = find_turning(instruments(trial))
-    assert isinstance(spiral, Spiral) and spiral.loop == "seen"
-    height = spiral.figures["loop_height_deg_s"]
-    assert height.low is not None and height.low > 1.0
 
 
 def test_noise_of_the_log_is_no_current() -> None:
