@@ -143,17 +143,15 @@ def _one(
 def _usual_wind(predicted: Predicted) -> tuple[float, float]:
     """Return no wind force, with the root mean square of those that the filter finds in the manoeuvres of the set.
 
-    A manoeuvre on which the set is not fitted has a wind of its own, from any side.
+    A manoeuvre on which the set is not fitted has a wind of its own, from any side. What wanders about the steady force
+    averages out in a turn; where the model lacks something it is that, too.
     """
     basis = predicted.basis
     model = _with_its_noise(predicted)
-    squares = [0.0]
-    for run in basis.runs.runs:
-        one = RunFilter(run, model, basis.runs.spec)
-        passed = _passed(one, predicted)
-        force, std = _steady_wind(one, passed) if passed else (0.0, 0.0)
-        squares.append(force**2 + std**2)
-    return 0.0, float(np.sqrt(sum(squares) / max(len(squares) - 1, 1)))
+    filters = [RunFilter(run, model, basis.runs.spec) for run in basis.runs.runs]
+    passes = [(one, _passed(one, predicted)) for one in filters]
+    steady = [_steady_wind(one, passed)[0] if passed else 0.0 for one, passed in passes]
+    return 0.0, float(np.sqrt(np.mean(np.square(steady))))
 
 
 class _Logs:
