@@ -72,10 +72,14 @@ def circles(hull: SimulatedHull, number: int, folder: Path) -> Path:
     return log
 
 
-def compared(number: int) -> list[Circle]:
-    """Return what was measured of a ship's circles beside its predictions, without the wind and with it."""
+def compared(number: int) -> tuple[list[Circle], tuple[int, int]]:
+    """Return what was measured of a ship's circles beside its predictions, without the wind and with it.
+
+    The other numbers are those of her own zigzags: overshoots within the intervals of the errors alone, and overshoots.
+    """
     hull, _ = drawn(number)
     found: list[Circle] = []
+    own = (0, 0)
     with TemporaryDirectory() as folder:
         warehouse = taken_in(hull, number, Path(folder), stamped=True)
         pool_vessel(warehouse, hull.name, Request(), identify_vessel(warehouse, hull.name))
@@ -86,11 +90,13 @@ def compared(number: int) -> list[Circle]:
                 predicted = CheckedPredictions(warehouse, hull.name, asked).predict(asked)
             except DataRejected:
                 continue
+            if predicted.own_zigzags is not None:
+                own = (predicted.own_zigzags.inside, predicted.own_zigzags.overshoots)
             with patch.object(as_sailed, "_usual_wind", return_value=(0.0, 0.0)):
                 before = measured_beside(warehouse, predicted)
             for wind, measured in ((_BEFORE, before), (_NOW, measured_beside(warehouse, predicted))):
                 found += _held([one for run in measured for one in run.figures], wind)
-    return found
+    return found, own
 
 
 def _held(figures: Sequence[Beside], wind: str) -> Iterator[Circle]:
@@ -99,7 +105,7 @@ def _held(figures: Sequence[Beside], wind: str) -> Iterator[Circle]:
             yield Circle(one.name, wind, one.inside, bool(one.agrees))
 
 
-def page(found: Sequence[Circle], ships: int) -> list[str]:
+def page(found: Sequence[Circle], own: Share, ships: int) -> list[str]:
     """Return the lines of the page."""
     by: dict[tuple[str, str], list[Circle]] = defaultdict(list)
     for one in found:
@@ -126,6 +132,9 @@ def page(found: Sequence[Circle], ships: int) -> list[str]:
         "predicted differ by no more than the intervals of both allow together. Wanted 95 %.",
         "",
         *result_page.table(head, rows),
+        "",
+        "First and second overshoots of her own zigzags, closed loop in the wind that the filter finds, within the "
+        f"intervals of the errors alone: {own}.",
     ]
 
 
@@ -135,15 +144,17 @@ def main() -> None:
     parser.add_argument("--ships", type=int, default=_COUNT)
     given = parser.parse_args()
     found: list[Circle] = []
+    inside, overshoots = 0, 0
     with ProcessPoolExecutor(2) as workers:
-        for done, one in enumerate(workers.map(compared, range(given.ships)), start=1):
-            found += one
+        for done, (circles_of_ship, own) in enumerate(workers.map(compared, range(given.ships)), start=1):
+            found += circles_of_ship
+            inside, overshoots = inside + own[0], overshoots + own[1]
             print(f"{done} of {given.ships} ships", flush=True)
     options = "" if given.ships == _COUNT else f"--ships {given.ships}"
     path = result_page.write(
         "identify.circles_in_wind",
         "Circles in the wind beside their predictions",
-        page(found, given.ships),
+        page(found, Share(inside, overshoots), given.ships),
         options=options,
     )
     print(path.read_text(encoding="utf-8"))

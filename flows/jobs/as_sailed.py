@@ -39,6 +39,8 @@ from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
+#: parts of a manoeuvre, none longer than a leg: what changes within one averages out
+_PARTS = 16
 #: a force that changes faster is no wind that is steady over a manoeuvre
 _STEADY_PER_S = 0.01
 
@@ -262,14 +264,18 @@ def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> tuple[Sta
 
 
 def _steady_wind(run: RunFilter, passed: Passed) -> tuple[float, float]:
-    """Return the wind force that the filter comes to in a manoeuvre, m/s^2, with its standard error and wandering.
+    """Return the wind force that the filter comes to in a manoeuvre, m/s^2, and how far that of a leg is from it.
 
     Both are 0 where the model's force is no steady wind.
     """
     if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S:
         return 0.0, 0.0
-    # the first half is what it takes to find it
+    # the first half is what it takes to find it; in its first legs it was as far from there as in any other
     late = slice(len(passed.states) // 2, None)
-    force, wander = float(np.mean(passed.states[late, F])), float(np.var(passed.states[late, F]))
-    std = float(np.sqrt(wander + np.mean(passed.spread[late, F])))
+    force, spread = float(np.mean(passed.states[late, F])), float(np.mean(passed.spread[late, F]))
+    legs = np.array_split(passed.states[:, F] - force, _PARTS)[1:]
+    wander = float(np.mean([np.mean(leg) ** 2 for leg in legs]))
+    within = float(np.mean([np.mean(leg**2) for leg in legs]))
+    # an error of the filter changes as quickly as the force that it follows
+    std = float(np.sqrt(wander + spread * (wander / within if within > 0.0 else 1.0)))
     return (force, std) if np.isfinite(force + std) else (0.0, 0.0)
