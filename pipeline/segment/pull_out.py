@@ -41,6 +41,10 @@ _SHORTEST, _LONGEST = 0.5, 8.0
 #: Part of the hold at whose end the rate is taken.
 _LAST_PART = 1.0 / 3.0
 
+#: Why a ship is not judged.
+_ALONE = "A pull-out to one side says nothing of her stability: it takes one to each side."
+_TOO_SHORT = "The rate was far from a steady one when the rudder left midships: hold it there longer."
+
 #: Smallest difference of both residual rates that counts, in standard errors and as a share of the rate of the turns.
 _APART_ERRORS, _APART_SHARE = 3.0, 0.05
 
@@ -169,7 +173,7 @@ def paired(pull_outs: Sequence[PullOut]) -> list[PullOut]:
     list of PullOut
         The same, each one of a pair with its partner and the verdict.
     """
-    judged = list(pull_outs)
+    judged = [replace(one, reasons=(*one.reasons, _ALONE)) for one in pull_outs]
     k = 0
     while k + 1 < len(judged):
         one, other = judged[k], judged[k + 1]
@@ -177,8 +181,15 @@ def paired(pull_outs: Sequence[PullOut]) -> list[PullOut]:
             k += 1
             continue
         verdict = _verdict(one, other)
-        judged[k] = replace(one, partner_start_utc_ns=other.start_utc_ns, verdict=verdict)
-        judged[k + 1] = replace(other, partner_start_utc_ns=one.start_utc_ns, verdict=verdict)
+        for at, (this, its_partner) in enumerate(((one, other), (other, one)), start=k):
+            # one that was broken off says so itself
+            more = (_TOO_SHORT,) if verdict == "not judged" and not pull_outs[at].reasons else ()
+            judged[at] = replace(
+                this,
+                partner_start_utc_ns=its_partner.start_utc_ns,
+                verdict=verdict,
+                reasons=(*pull_outs[at].reasons, *more),
+            )
         k += 2
     return judged
 
@@ -190,4 +201,7 @@ def _verdict(one: PullOut, other: PullOut) -> Verdict:
         return "not judged"
     turned = [abs(p.figures["initial_yaw_rate_deg_s"].value or 0.0) for p in (one, other)]
     apart = max(_APART_ERRORS * float(np.hypot(right.std, left.std)), _APART_SHARE * sum(turned) / 2)
+    if apart >= sum(turned):
+        # not even turns that go on as they were would be seen
+        return "not judged"
     return "unstable" if right.value - left.value > apart else "no instability seen"

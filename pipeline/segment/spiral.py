@@ -43,6 +43,11 @@ _TURNED_RAD = float(np.deg2rad(30.0))
 _LOOP_ERRORS, _LOOP_SHARE = 3.0, 0.05
 
 
+#: Why a loop is not judged.
+_ONE_WAY = "The rudder went one way only: a loop cannot be seen."
+_TOO_SHORT = "She was far from a steady rate at every angle that both ways hold: hold each longer."
+
+
 @dataclass(frozen=True)
 class SpiralPoint:
     """One step: a rudder angle and the yaw rate that the ship came to."""
@@ -185,7 +190,9 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
     parts = [points[a - first : b - first + 1] for a, b in ways]
     loop, figures = _loop(parts, float(np.rad2deg(band(0.0, signals.rudder_noise))))
     unsteady = steady.count(False)
-    reasons = [] if loop != "not judged" else ["The rudder went one way only: a loop cannot be seen."]
+    reasons = []
+    if loop == "not judged":
+        reasons.append(_ONE_WAY if len(parts) < 2 else _TOO_SHORT)
     if unsteady:
         reasons.append(f"The yaw rate was not steady yet at the end of {unsteady} of {len(steady)} steps.")
     return Spiral(
@@ -218,6 +225,8 @@ def _loop(ways: list[tuple[SpiralPoint, ...]], same_deg: float) -> tuple[Loop, d
         # both ways share the outermost hold
         and a is not b
     ]
+    if not any(_LOOP_ERRORS * h.std < largest for h in heights):
+        return "not judged", {name: Figure.of(nan, nan, "the rates are not known well enough") for name in nothing}
     seen = [h for h in heights if (h.value or 0.0) > max(_LOOP_ERRORS * h.std, _LOOP_SHARE * largest)]
     if not seen:
         return "none seen", nothing

@@ -16,9 +16,8 @@ from kempf.pipeline.segment.measured import Signals
 #: Parts into which the while is divided.
 _PARTS = 4
 #: Smallest change from one third of a while to the next, in standard errors, that shows how the rate goes on; largest
-#: one, as a share of the change before: what hardly slows down does not say where it comes to. Error of where it comes
-#: to, as a share of what is still missing.
-_MOVES_ERRORS, _SLOWS, _MISSING_SHARE = 2.0, 0.95, 1.0
+#: one, as a share of the change before: what hardly slows down does not say where it comes to.
+_MOVES_ERRORS, _SLOWS = 2.0, 0.95
 
 
 @dataclass(frozen=True)
@@ -76,10 +75,11 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
     """Measure the yaw rate to which a ship comes with the rudder that she holds.
 
     What is missing dies away exponentially, so that the changes of the mean from third to third are a geometric series,
-    of which the rest is added to the last. A stable ship that is not given the time lags behind her rudder, and the
-    same rudder has two rates, which looks like the loop of an unstable one. Where the changes are lost in the noise the
-    mean of the last third is the rate, with its change as an error; where they do not become smaller nobody knows to
-    what she comes, and the error is what would be missing if they hardly did.
+    of which the rest is added to the last, with an error as large: sway and yaw die away at two rates. A stable ship
+    that is not given the time lags behind her rudder, and the same rudder has two rates, which looks like the loop of
+    an unstable one. Where the changes are lost in the noise the mean of the last third is the rate, with its change as
+    an error; where they do not become smaller nobody knows to what she comes, and the error is what would be missing if
+    they hardly did.
 
     Parameters
     ----------
@@ -95,8 +95,7 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
     moves = before * now > 0.0 and abs(now) > _MOVES_ERRORS * last.std
     if moves and abs(now) < _SLOWS * abs(before):
         missing = now * now / (before - now)
-        std = float(np.hypot(last.std, _MISSING_SHARE * missing))
-        return SettlingRate(last, last.value + missing, std, on_the_way=True)
+        return SettlingRate(last, last.value + missing, float(np.hypot(last.std, missing)), on_the_way=True)
     if moves:
         missing = now * _SLOWS / (1.0 - _SLOWS)
         return SettlingRate(last, last.value, float(np.hypot(last.std, missing)), on_the_way=False)

@@ -46,8 +46,8 @@ def headline(segment: Segment) -> str:
             "unstable": "the pair shows: unstable on a straight course",
             "no instability seen": "the pair shows no instability",
         }
-        return f"pull-out from {rudder}; {pair.get(verdict, 'not judged: it takes one to each side')}"
-    loop = {"seen": "loop seen", "none seen": "no loop seen", "not judged": "one way only, a loop cannot be seen"}
+        return f"pull-out from {rudder}; {pair.get(verdict, 'not judged')}"
+    loop = {"seen": "loop seen", "none seen": "no loop seen", "not judged": "a loop cannot be seen"}
     points = segment.detail["points"]
     return f"spiral, {len(points)} steps from {rudder}; {loop[segment.detail['loop']]}"
 
