@@ -1,0 +1,220 @@
+"""Whether the zigzag that `kempf next-trial` orders parts what fits alike: ``python -m benchmarks.diagnose.parted``.
+
+Ships of the hidden cases whose diagnosis names several effects between which it cannot choose. The first of them is
+added and the next trial asked for, as a user does it. The plant, which shares no code with the estimator, sails that
+zigzag on a third day; for comparison it sails a 20/20 zigzag instead. Each ship is then diagnosed anew, from the plain
+model, with all three days. ``--work DIR`` keeps what was found, ship by ship.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass, replace
+from datetime import UTC, datetime
+from functools import partial
+from math import radians
+from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+
+from benchmarks import result_page
+from benchmarks.diagnose.hidden_effects import programme, readings, sail
+from benchmarks.diagnose.hidden_effects.cases import Case, design
+from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
+from benchmarks.diagnose.hidden_effects.sail import VoyageFailed
+from benchmarks.diagnose.hidden_effects.taken_in import taken_in
+from benchmarks.diagnose.hidden_effects.tally import Share
+from benchmarks.diagnose.hidden_effects.write import logs_of
+from kempf.flows.jobs.add_effect import add_effect
+from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.next_trial import next_trial
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.simulate.hulls import SimulatedHull
+from kempf.pipeline.simulate.mcap_log import to_mcap
+from kempf.pipeline.simulate.trial import TrialSettings
+from kempf.schemas.errors import KempfError
+from kempf.warehouse.store import Warehouse
+
+_SEED, _CASES, _SHIPS = 20261129, 336, 12
+_STANDARD_DEG = (20.0, 20.0)
+#: Of the cases: the third day is another month, with a weather and noise of its own.
+_OTHER_DAY, _LATER_DAYS = 7919, 400
+_LEGS, _STEADY_LENGTHS, _LONGEST_LENGTHS = 5.0, 20.0, 100.0
+
+
+@dataclass(frozen=True)
+class Parted:
+    """What became of one ship."""
+
+    ship: str
+    hidden: str
+    before: tuple[str, ...]
+    ordered_deg: tuple[float, float]
+    #: That the trial parts the models, whichever is true.
+    probability: float
+    #: Sets with the ordered zigzag and with the standard one.
+    after: tuple[str, ...]
+    after_standard: tuple[str, ...]
+
+
+def orders(angles_deg: tuple[float, float], hull: SimulatedHull, seed: int, day: int) -> Float:
+    """Return a programme of one zigzag, as `benchmarks.diagnose.hidden_effects.programme.orders` does of several."""
+    heading = float(np.random.default_rng([seed, day]).uniform(0.0, 2.0 * np.pi))
+    own_s, shaft, depth = hull.length_m / hull.trial_speed_m_s, hull.shaft_speed_per_s, 10.0 * hull.draught_m
+    psi, delta = map(radians, angles_deg)
+    return np.array(
+        [
+            [0.0, _STEADY_LENGTHS * own_s, heading, 0.0, 0.0, 0.0, 0.0, shaft, depth],
+            [1.0, _LONGEST_LENGTHS * own_s, heading, psi, delta, 1.0, _LEGS, shaft, depth],
+        ]
+    )
+
+
+def third_day(case: Case, c: float, angles_deg: tuple[float, float]) -> tuple[str, bytes]:
+    """Let the plant sail one zigzag more; return name and bytes of its log."""
+    hull, seed = programme.ship(case.hull, case.seed), case.seed + _OTHER_DAY
+    weather = programme.weather(hull, case.disturbance, seed, 1)
+    with patch.object(programme, "orders", partial(orders, angles_deg)):
+        voyage = sail.voyage(hull, weather, case.hidden, c, seed, 1)
+    settings = TrialSettings(
+        hull, (), instruments=readings.instruments(hull), seed=seed, noise_scale=case.noise,
+        start_utc_ns=round((datetime(2025, 1, 5, 6, tzinfo=UTC).timestamp() + _LATER_DAYS * 86400.0) * 1e9),
+    )  # fmt: skip
+    sensor = (case.hidden.name, c) if case.hidden and case.hidden.sensor else None
+    trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor, sold=case.sold)
+    return f"third-{angles_deg[0]:g}-{angles_deg[1]:g}.mcap", to_mcap(trial)
+
+
+def parted(case: Case) -> Parted | None:
+    """Return what became of a ship, None of one whose diagnosis leaves nothing to be parted."""
+    try:
+        files, answer = logs_of(case)
+    except VoyageFailed:
+        return None
+    c = next(iter(answer["parameters"].values()))
+    with TemporaryDirectory() as folder:
+        warehouse = taken_in(files, Path(folder))
+        before = _first_set(warehouse, case)
+        if len(before) < 2:
+            return None
+        try:
+            add_effect(warehouse, case.case_id, before[0], begin=(PLAIN, NONE_OF_ONES_OWN))
+            ordered = next_trial(warehouse, case.case_id)
+        except KempfError:
+            return None
+        if not ordered.parting:
+            return None
+        best = ordered.trials[0]
+        found = []
+        for angles in (best.angles_deg, _STANDARD_DEG):
+            place = Warehouse(
+                str(copytree(warehouse.uri, Path(folder) / "{:g}-{:g}".format(*angles), dirs_exist_ok=True))
+            )
+            name, data = third_day(case, c, angles)
+            (Path(folder) / name).write_bytes(data)
+            ingest(place, [Path(folder) / name], case.case_id)
+            found.append(_first_set(place, case))
+    return Parted(
+        f"{case.hull}, noise {case.noise:g}, {case.disturbance}{', as sold' if case.sold else ''}",
+        *(case.effect, before, best.angles_deg, best.probability or 0.0, *found),
+    )
+
+
+def _first_set(warehouse: Warehouse, case: Case) -> tuple[str, ...]:
+    """Return the set with the true effect, or the first."""
+    content = diagnose_vessel(warehouse, case.case_id, PLAIN)[0].content
+    sets = [tuple(one["effects"]) for one in content["sets"]]
+    return next((one for one in sets if case.effect in one), sets[0] if sets else ())
+
+
+def cases(seed: int) -> Iterator[Case]:
+    """Draw ships whose effect moves the hull, in the order of the design."""
+    for case in design(_CASES, seed):
+        if case.kind == "catalogue" and not CATALOGUE[case.effect].sensor and case.strength > 0:
+            yield case
+
+
+def _kept(case: Case, work: Path | None) -> Parted | None:
+    path = None if work is None else work / f"{case.case_id}.json"
+    if path is not None and path.exists():
+        known: dict[str, Any] | None = json.loads(path.read_text(encoding="utf-8"))
+        return (
+            None if known is None else Parted(**{k: tuple(v) if isinstance(v, list) else v for k, v in known.items()})
+        )
+    found = parted(case)
+    if path is not None:
+        path.write_text(json.dumps(None if found is None else asdict(found)), encoding="utf-8")
+    return found
+
+
+def page(found: list[Parted], looked_at: int) -> list[str]:
+    """Return the lines of the page."""
+
+    def smaller(after: tuple[str, ...], one: Parted) -> bool:
+        return one.hidden in after and len(after) < len(one.before)
+
+    rows = [
+        [
+            *(one.ship, one.hidden, " or ".join(one.before)),
+            *("{:g}/{:g}".format(*one.ordered_deg), f"{100.0 * one.probability:.0f} %"),
+            *(" or ".join(one.after) or "none", " or ".join(one.after_standard) or "none"),
+        ]
+        for one in found
+    ]
+    head = ["ship", "hidden", "named before", "ordered", "parts with", "named after it", "after a 20/20 instead"]
+    true = [one for one in found if one.hidden in one.before]
+    shares = [
+        Share(sum(smaller(after, one) for one, after in ((one, getattr(one, which)) for one in true)), len(true))
+        for which in ("after", "after_standard")
+    ]
+    alone = [
+        Share(sum(getattr(one, which) == (one.hidden,) for one in true), len(true))
+        for which in ("after", "after_standard")
+    ]
+    return [
+        f"{len(found)} of {looked_at} ships with a medium or large effect on the hull had several effects named, "
+        "between which the diagnosis could not choose. *Parts with*: the probability with which the ordered zigzag was said to "
+        "part the models, whichever is true.",
+        "",
+        *result_page.table(head, rows),
+        "",
+        f"Of the sets that held the true effect, smaller afterwards and with it: {shares[0]}; after a 20/20 zigzag "
+        f"instead {shares[1]}. The true effect alone: {alone[0]} and {alone[1]}.",
+    ]
+
+
+def main() -> None:
+    """Sail the ships and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.partition(":")[0])
+    parser.add_argument("--ships", type=int, default=_SHIPS, help="how many with something to be parted")
+    parser.add_argument("--work", type=Path)
+    given = parser.parse_args()
+    if given.work is not None:
+        given.work.mkdir(parents=True, exist_ok=True)
+    found: list[Parted] = []
+    looked_at = 0
+    with ProcessPoolExecutor(2) as workers:
+        drawn = cases(_SEED)
+        while len(found) < given.ships:
+            # as many at a time as there are processes: no more ships are sailed than are shown
+            for one in workers.map(partial(_kept, work=given.work), [next(drawn), next(drawn)]):
+                looked_at += 1
+                if one is not None:
+                    found.append(replace(one))
+                print(f"{looked_at} ships, {len(found)} with something to be parted: {one}", flush=True)
+    options = "" if given.ships == _SHIPS else f"--ships {given.ships}"
+    path = result_page.write("diagnose.parted", "Trials that part models", page(found, looked_at), options=options)
+    print(path.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()
