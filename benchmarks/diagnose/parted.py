@@ -182,8 +182,8 @@ def page(found: list[Parted], looked_at: int) -> list[str]:
     ]
     return [
         f"{len(found)} of {looked_at} ships with a medium or large effect on the hull had several effects named, "
-        "between which the diagnosis could not choose. *Parts with*: the probability with which the ordered zigzag was said to "
-        "part the models, whichever is true.",
+        "between which the diagnosis could not choose. *Parts with*: the probability with which the ordered zigzag was "
+        "said to part the models, whichever is true.",
         "",
         *result_page.table(head, rows),
         "",
