@@ -38,12 +38,18 @@ _STEADY_TURN, _STEADY_END = 0.2, 0.1
 #: as far as it is looked at.
 _SHORTEST, _LONGEST = 0.5, 8.0
 
-#: Part of the hold at whose end the rate is taken.
+#: Part of the turn at whose end its rate is taken.
 _LAST_PART = 1.0 / 3.0
+
+#: Largest error of the rate to which she comes, as a share of the turn's, with which it counts as known.
+_KNOWN = 1.0 / 3.0
+
+#: Share of the rates of the turns that has to be seen where it is left.
+_SEEN = 0.5
 
 #: Why a ship is not judged.
 _ALONE = "A pull-out to one side says nothing of her stability: it takes one to each side."
-_TOO_SHORT = "The rate was far from a steady one when the rudder left midships: hold it there longer."
+_TOO_SHORT = "The rate was far from a steady one when the rudder left amidships: hold it there longer."
 
 #: Smallest difference of both residual rates that counts, in standard errors and as a share of the rate of the turns.
 _APART_ERRORS, _APART_SHARE = 3.0, 0.05
@@ -91,7 +97,8 @@ def pull_out(signals: Signals, turn: HeldRudder, after: HeldRudder, settings: Se
     -------
     PullOut or None
         None where it is none: the turn was not steady or less than 60 deg, the rudder did not go to about midships by
-        one movement, or it was not held there until the rate had become steady or fallen to a half.
+        one movement, or it was not held there until the rate had become steady, showed to what it comes, or had fallen
+        to a half.
 
     References
     ----------
@@ -110,7 +117,8 @@ def pull_out(signals: Signals, turn: HeldRudder, after: HeldRudder, settings: Se
     if not in_time or signals.longest_gap_s(turn.end_s, end_s) > settings.gap_share * quarter_s:
         return None
     residual = settling_rate(signals, after.start_s, end_s)
-    settled = residual.on_the_way or abs(residual.last.change) <= _STEADY_END * abs(initial.value)
+    known = residual.on_the_way and residual.comes_to_std <= _KNOWN * abs(initial.value)
+    settled = known or abs(residual.last.change) <= _STEADY_END * abs(initial.value)
     if not settled and residual.last.value / initial.value > 0.5:
         return None
     ramp = measure_ramp(
@@ -182,8 +190,7 @@ def paired(pull_outs: Sequence[PullOut]) -> list[PullOut]:
             continue
         verdict = _verdict(one, other)
         for at, (this, its_partner) in enumerate(((one, other), (other, one)), start=k):
-            # one that was broken off says so itself
-            more = (_TOO_SHORT,) if verdict == "not judged" and not pull_outs[at].reasons else ()
+            more = (_TOO_SHORT,) if verdict == "not judged" and _unsure(this) else ()
             judged[at] = replace(
                 this,
                 partner_start_utc_ns=its_partner.start_utc_ns,
@@ -194,6 +201,12 @@ def paired(pull_outs: Sequence[PullOut]) -> list[PullOut]:
     return judged
 
 
+def _unsure(one: PullOut) -> bool:
+    """Whether the rate that is left is why a pair is not judged; one that was broken off says so itself."""
+    left, turned = one.figures["residual_yaw_rate_deg_s"], one.figures["initial_yaw_rate_deg_s"].value or 0.0
+    return left.value is not None and _APART_ERRORS * float(np.sqrt(2.0)) * left.std >= _SEEN * 2.0 * abs(turned)
+
+
 def _verdict(one: PullOut, other: PullOut) -> Verdict:
     starboard, port = (one, other) if one.side == "starboard" else (other, one)
     right, left = (p.figures["residual_yaw_rate_deg_s"] for p in (starboard, port))
@@ -201,7 +214,6 @@ def _verdict(one: PullOut, other: PullOut) -> Verdict:
         return "not judged"
     turned = [abs(p.figures["initial_yaw_rate_deg_s"].value or 0.0) for p in (one, other)]
     apart = max(_APART_ERRORS * float(np.hypot(right.std, left.std)), _APART_SHARE * sum(turned) / 2)
-    if apart >= sum(turned):
-        # not even turns that go on as they were would be seen
+    if apart >= _SEEN * sum(turned):
         return "not judged"
     return "unstable" if right.value - left.value > apart else "no instability seen"

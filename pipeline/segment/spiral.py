@@ -39,13 +39,17 @@ _STEADY_STEPS = 0.7
 #: Smallest change of the heading under the outermost angles, rad: in course keeping the rudder does not turn the ship.
 _TURNED_RAD = float(np.deg2rad(30.0))
 
+#: Largest rudder, as a share of the outermost, at which a loop is looked for: none reaches out to where both ways turn.
+_INNER = 0.6
+
 #: Smallest difference between both ways that is a loop, in standard errors, and as a share of the largest rate.
 _LOOP_ERRORS, _LOOP_SHARE = 3.0, 0.05
 
 
 #: Why a loop is not judged.
 _ONE_WAY = "The rudder went one way only: a loop cannot be seen."
-_TOO_SHORT = "She was far from a steady rate at every angle that both ways hold: hold each longer."
+_NONE_SHARED = "The two ways hold no rudder angle in common: a loop cannot be seen."
+_TOO_SHORT = "She was far from a steady rate at the small angles that both ways hold: hold each longer."
 
 
 @dataclass(frozen=True)
@@ -173,7 +177,7 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
     if not np.mean(steady) >= _STEADY_STEPS:
         return None
     outermost = [k - first for way in ways for k in way]
-    if not all(holds[k].rudder * rates[k].last.value > 0 for k in outermost):
+    if not all(holds[k].rudder * rate > 0 for k in outermost for rate in (rates[k].last.value, rates[k].comes_to)):
         return None
     if not all(abs(rates[k].last.value) * holds[k].duration_s >= _TURNED_RAD for k in outermost):
         return None
@@ -188,11 +192,8 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
         for hold, rate, at_rest in zip(holds, rates, steady, strict=True)
     )
     parts = [points[a - first : b - first + 1] for a, b in ways]
-    loop, figures = _loop(parts, float(np.rad2deg(band(0.0, signals.rudder_noise))))
+    loop, figures, reasons = _loop(parts, float(np.rad2deg(band(0.0, signals.rudder_noise))), degrees(largest))
     unsteady = steady.count(False)
-    reasons = []
-    if loop == "not judged":
-        reasons.append(_ONE_WAY if len(parts) < 2 else _TOO_SHORT)
     if unsteady:
         reasons.append(f"The yaw rate was not steady yet at the end of {unsteady} of {len(steady)} steps.")
     return Spiral(
@@ -209,31 +210,35 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
     )
 
 
-def _loop(ways: list[tuple[SpiralPoint, ...]], same_deg: float) -> tuple[Loop, dict[str, Figure]]:
-    """Compare the first way with the second at the angles that both hold."""
-    none = "the rudder went one way only" if len(ways) < 2 else "the way there and the way back agree"
-    nothing = {name: Figure.of(nan, nan, none) for name in ("loop_width_deg", "loop_height_deg_s")}
+def _loop(
+    ways: list[tuple[SpiralPoint, ...]], same_deg: float, largest_deg_s: float
+) -> tuple[Loop, dict[str, Figure], list[str]]:
+    """Compare the first way with the second at the angles that both hold; return what is to be said of it, too."""
     if len(ways) < 2:
-        return "not judged", nothing
+        return "not judged", _no_loop("the rudder went one way only"), [_ONE_WAY]
     falling, rising = ways[:2] if ways[0][0].rudder_deg > ways[0][-1].rudder_deg else (ways[1], ways[0])
-    largest = max(abs(point.yaw_rate_deg_s.value or 0.0) for way in ways for point in way)
+    inner = _INNER * max(abs(point.rudder_deg) for way in ways[:2] for point in way)
     heights = [
         Figure.of((a.yaw_rate_deg_s.value or 0.0) - (b.yaw_rate_deg_s.value or 0.0), _both(a, b))
         for a in falling
         for b in rising
-        if abs(a.rudder_deg - b.rudder_deg) <= same_deg
-        # both ways share the outermost hold
-        and a is not b
+        if abs(a.rudder_deg - b.rudder_deg) <= same_deg and abs(a.rudder_deg) <= inner
     ]
-    if not any(_LOOP_ERRORS * h.std < largest for h in heights):
-        return "not judged", {name: Figure.of(nan, nan, "the rates are not known well enough") for name in nothing}
-    seen = [h for h in heights if (h.value or 0.0) > max(_LOOP_ERRORS * h.std, _LOOP_SHARE * largest)]
+    if not heights:
+        return "not judged", _no_loop("the two ways hold no rudder angle in common"), [_NONE_SHARED]
+    if not any(_LOOP_ERRORS * height.std < largest_deg_s for height in heights):
+        return "not judged", _no_loop("the rates are not known well enough"), [_TOO_SHORT]
+    seen = [h for h in heights if (h.value or 0.0) > max(_LOOP_ERRORS * h.std, _LOOP_SHARE * largest_deg_s)]
     if not seen:
-        return "none seen", nothing
+        return "none seen", _no_loop("the way there and the way back agree"), []
     height = max(seen, key=lambda h: h.value or 0.0)
     (down, down_low, down_high), (up, up_low, up_high) = _crossing(falling), _crossing(rising)
     width = Figure(up - down, max(up_low - down_high, 0.0), up_high - down_low)
-    return "seen", {"loop_width_deg": width, "loop_height_deg_s": height}
+    return "seen", {"loop_width_deg": width, "loop_height_deg_s": height}, []
+
+
+def _no_loop(why: str) -> dict[str, Figure]:
+    return {name: Figure.of(nan, nan, why) for name in ("loop_width_deg", "loop_height_deg_s")}
 
 
 def _both(one: SpiralPoint, other: SpiralPoint) -> float:

@@ -75,11 +75,11 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
     """Measure the yaw rate to which a ship comes with the rudder that she holds.
 
     What is missing dies away exponentially, so that the changes of the mean from third to third are a geometric series,
-    of which the rest is added to the last, with an error as large: sway and yaw die away at two rates. A stable ship
-    that is not given the time lags behind her rudder, and the same rudder has two rates, which looks like the loop of
-    an unstable one. Where the changes are lost in the noise the mean of the last third is the rate, with its change as
-    an error; where they do not become smaller nobody knows to what she comes, and the error is what would be missing if
-    they hardly did.
+    of which the rest is added to the last, no more than has changed already, with the whole of it as an error: sway and
+    yaw die away at two rates. A stable ship that is not given the time lags behind her rudder, and the same rudder has
+    two rates, which looks like the loop of an unstable one. Where the changes are lost in the noise the mean of the
+    last third is the rate, with its change as an error; where they do not become smaller it is, too, and the error is
+    what would be missing if they hardly did.
 
     Parameters
     ----------
@@ -92,11 +92,15 @@ def settling_rate(signals: Signals, start_s: float, end_s: float) -> SettlingRat
     first, second, last = (mean_yaw_rate(signals, *border) for border in pairwise(borders))
     before, now = second.value - first.value, last.value - second.value
     # written so that NaN fails
-    moves = before * now > 0.0 and abs(now) > _MOVES_ERRORS * last.std
-    if moves and abs(now) < _SLOWS * abs(before):
-        missing = now * now / (before - now)
-        return SettlingRate(last, last.value + missing, float(np.hypot(last.std, missing)), on_the_way=True)
-    if moves:
-        missing = now * _SLOWS / (1.0 - _SLOWS)
-        return SettlingRate(last, last.value, float(np.hypot(last.std, missing)), on_the_way=False)
-    return SettlingRate(last, last.value, float(np.hypot(last.std, last.change)), on_the_way=False)
+    if not (before * now > 0.0 and _clear(before, first, second) and _clear(now, second, last)):
+        return SettlingRate(last, last.value, float(np.hypot(last.std, last.change)), on_the_way=False)
+    slows = now / before < _SLOWS
+    ratio = min(now / before, _SLOWS)
+    missing = now * ratio / (1.0 - ratio)
+    std, changed = float(np.hypot(last.std, missing)), abs(last.value - first.value)
+    more = float(np.clip(missing, -changed, changed)) if slows else 0.0
+    return SettlingRate(last, last.value + more, std, on_the_way=slows)
+
+
+def _clear(change: float, one: MeanYawRate, other: MeanYawRate) -> bool:
+    return abs(change) > _MOVES_ERRORS * float(np.hypot(one.std, other.std))
