@@ -12,7 +12,7 @@ import argparse
 import json
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
 from math import radians
@@ -95,34 +95,31 @@ def third_day(case: Case, c: float, angles_deg: tuple[float, float]) -> tuple[st
 
 
 def parted(case: Case) -> Parted | None:
-    """Return what became of a ship, None of one whose diagnosis leaves nothing to be parted."""
+    """Return what became of a ship, None of one that leaves nothing to be parted or cannot sail the third day."""
     try:
         files, answer = logs_of(case)
-    except VoyageFailed:
+        with TemporaryDirectory() as folder:
+            return _parted(case, next(iter(answer["parameters"].values())), taken_in(files, Path(folder)), Path(folder))
+    except (VoyageFailed, KempfError):
         return None
-    c = next(iter(answer["parameters"].values()))
-    with TemporaryDirectory() as folder:
-        warehouse = taken_in(files, Path(folder))
-        before = _first_set(warehouse, case)
-        if len(before) < 2:
-            return None
-        try:
-            add_effect(warehouse, case.case_id, before[0], begin=(PLAIN, NONE_OF_ONES_OWN))
-            ordered = next_trial(warehouse, case.case_id)
-        except KempfError:
-            return None
-        if not ordered.parting:
-            return None
-        best = ordered.trials[0]
-        found = []
-        for angles in (best.angles_deg, _STANDARD_DEG):
-            place = Warehouse(
-                str(copytree(warehouse.uri, Path(folder) / "{:g}-{:g}".format(*angles), dirs_exist_ok=True))
-            )
-            name, data = third_day(case, c, angles)
-            (Path(folder) / name).write_bytes(data)
-            ingest(place, [Path(folder) / name], case.case_id)
-            found.append(_first_set(place, case))
+
+
+def _parted(case: Case, c: float, warehouse: Warehouse, folder: Path) -> Parted | None:
+    before = _first_set(warehouse, case)
+    if len(before) < 2:
+        return None
+    add_effect(warehouse, case.case_id, before[0], begin=(PLAIN, NONE_OF_ONES_OWN))
+    ordered = next_trial(warehouse, case.case_id)
+    if not ordered.parting:
+        return None
+    best = ordered.trials[0]
+    found = []
+    for which, angles in (("ordered", best.angles_deg), ("standard", _STANDARD_DEG)):
+        place = Warehouse(str(copytree(warehouse.uri, folder / which)))
+        name, data = third_day(case, c, angles)
+        (folder / name).write_bytes(data)
+        ingest(place, [folder / name], case.case_id)
+        found.append(_first_set(place, case))
     return Parted(
         f"{case.hull}, noise {case.noise:g}, {case.disturbance}{', as sold' if case.sold else ''}",
         *(case.effect, before, best.angles_deg, best.probability or 0.0, *found),
@@ -203,14 +200,15 @@ def main() -> None:
     found: list[Parted] = []
     looked_at = 0
     with ProcessPoolExecutor(2) as workers:
-        drawn = cases(_SEED)
-        while len(found) < given.ships:
-            # as many at a time as there are processes: no more ships are sailed than are shown
-            for one in workers.map(partial(_kept, work=given.work), [next(drawn), next(drawn)]):
+        drawn = list(cases(_SEED))
+        # as many at a time as there are processes: no more ships are sailed than are shown
+        for pair in zip(drawn[::2], drawn[1::2], strict=False):
+            for one in workers.map(partial(_kept, work=given.work), pair):
                 looked_at += 1
-                if one is not None:
-                    found.append(replace(one))
+                found += [one] if one is not None else []
                 print(f"{looked_at} ships, {len(found)} with something to be parted: {one}", flush=True)
+            if len(found) >= given.ships:
+                break
     options = "" if given.ships == _SHIPS else f"--ships {given.ships}"
     path = result_page.write("diagnose.parted", "Trials that part models", page(found, looked_at), options=options)
     print(path.read_text(encoding="utf-8"))

@@ -2,7 +2,7 @@
 
 The ships of `benchmarks.identify.prediction` without an effect sail their zigzags on one day and circles on another,
 each day in a wind and a stream of its own. What was measured of the circles is held against ``kempf predict
---compare``: without any error of the wind force, as it was before docs/decisions/0101, and as it is.
+--compare``: without an error of the wind force, and as it is (docs/decisions/0101).
 """
 
 from __future__ import annotations

@@ -55,8 +55,8 @@ class AsSailed:
     speed_m_s: float
     #: The wind counted from the course of the approach.
     began: Began
-    #: Steady wind force and its standard error: of a zigzag as the filter finds it; of any other, which no filter
-    #: passes, none with the size that it has in the zigzags of the set.
+    #: Steady wind force and its standard error: of a zigzag as the filter finds it; of what no filter passes, none
+    #: with the size that it has in the zigzags of the set.
     wind_force_m_s2: tuple[float, float]
     arm_per_m: float
     #: ``fitted`` where the set was identified from it, ``held_out`` else.
@@ -103,12 +103,11 @@ def as_sailed(
     """
     zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, Zigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
-    usual = _usual_wind(predicted) if len(zigzags) < len(pairs) else (0.0, 0.0)
+    usual = _usual_wind(predicted) if len(runs) < len(pairs) else (0.0, 0.0)
     sailed, logs = [], _Logs(warehouse)
     for done, (segment, manoeuvre) in enumerate(pairs):
         progress(done, len(pairs), f"reading {segment.segment_id}")
-        wind = (0.0, 0.0) if isinstance(manoeuvre, Zigzag) else usual
-        sailed.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id), wind))
+        sailed.append(_one(predicted, manoeuvre, segment, logs.of(segment), runs.get(segment.segment_id), usual))
     progress(len(pairs), len(pairs), "read")
     return sailed
 
@@ -152,8 +151,10 @@ def _usual_wind(predicted: Predicted) -> tuple[float, float]:
     model = _with_its_noise(predicted)
     filters = [RunFilter(run, model, basis.runs.spec) for run in basis.runs.runs]
     passes = [(one, _passed(one, predicted)) for one in filters]
-    steady = [_steady_wind(one, passed)[0] if passed else 0.0 for one, passed in passes]
-    return 0.0, float(np.sqrt(np.mean(np.square(steady))))
+    found = [_steady_wind(one, passed) for one, passed in passes if passed]
+    # one that could not be passed says nothing
+    steady = [force for force, std in found if std > 0.0]
+    return 0.0, float(np.sqrt(np.mean(np.square(steady)))) if steady else 0.0
 
 
 class _Logs:

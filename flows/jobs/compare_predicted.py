@@ -9,7 +9,7 @@ from typing import Any
 
 from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
 from kempf.flows.jobs.predicted import Predicted
-from kempf.flows.jobs.spiral_ways import rates_of
+from kempf.flows.jobs.spiral_ways import SAME_ORDER_DEG, rates_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.prediction import Figure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
@@ -25,8 +25,6 @@ from kempf.warehouse.store import Warehouse
 _KINDS: dict[type, str] = {TurningCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
 #: ships drawn for each measured manoeuvre
 _DRAWS = 128
-#: rudder angles that differ by less are the same order, deg
-_SAME_DEG = 0.6
 
 
 @dataclass(frozen=True)
@@ -140,9 +138,9 @@ def _same_order(segment: Segment, manoeuvre: Manoeuvre) -> bool:
     if segment.kind != _KINDS[type(manoeuvre)]:
         return False
     rudder = radians(segment.delta0_deg)
-    same = abs(rudder - manoeuvre.rudder_rad) < radians(_SAME_DEG)  # type: ignore[attr-defined]
+    same = abs(rudder - manoeuvre.rudder_rad) < radians(SAME_ORDER_DEG)  # type: ignore[attr-defined]
     if isinstance(manoeuvre, Zigzag):
-        return same and abs(radians(segment.psi0_deg) - manoeuvre.heading_rad) < radians(_SAME_DEG)
+        return same and abs(radians(segment.psi0_deg) - manoeuvre.heading_rad) < radians(SAME_ORDER_DEG)
     return same or isinstance(manoeuvre, Spiral)
 
 

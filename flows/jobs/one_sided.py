@@ -60,6 +60,9 @@ def one_sided(measured: Sequence[MeasuredManoeuvre]) -> tuple[OneSided, ...]:
     by_figure: dict[str, list[Beside]] = {}
     for manoeuvre in measured:
         for beside in manoeuvre.figures:
+            # steps of spirals are numbered by the angles of each
+            if manoeuvre.orders_deg and "." in beside.name:
+                continue
             # of opposite signs neither is the larger one
             if beside.predicted.value is not None and beside.predicted.value * beside.measured > 0.0:
                 by_figure.setdefault(beside.name, []).append(beside)

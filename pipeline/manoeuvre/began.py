@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
+from kempf.pipeline.channels.rounding import rounding_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 from kempf.pipeline.manoeuvre.ship import Start
 
@@ -84,7 +85,8 @@ def _std(instruments: Instruments, channel: str, over_s: float) -> float | None:
     noise = float("nan") if series is None else noise_std(series)
     if series is None or not np.isfinite(noise):
         return None
-    return noise / float(np.sqrt(max(over_s / series.period_s, 1.0)))
+    # readings that repeat each other share the error of their rounding
+    return float(np.hypot(noise / np.sqrt(max(over_s / series.period_s, 1.0)), rounding_std(series)))
 
 
 def _mean(course: Float) -> float | None:

@@ -170,9 +170,13 @@ class Ship:
 
     def felt_rad(self, order_rad: float) -> float:
         """Return the rudder that the hull feels once the reading has come to an order from amidships: short of play."""
+        return float(np.sign(order_rad)) * max(abs(order_rad) - self.lost_rad, 0.0)
+
+    @property
+    def lost_rad(self) -> float:
+        """By how much the rudder that the hull feels stays behind its reading, to the side from which it comes."""
         kinds, sizes = self._gear()
-        play = 0.5 * float(np.sum(sizes[kinds == KINDS["backlash"]]))
-        return float(np.sign(order_rad)) * max(abs(order_rad) - play, 0.0)
+        return 0.5 * float(np.sum(sizes[kinds == KINDS["backlash"]]))
 
     def _gear(self) -> tuple[NDArray[np.int64], Float]:
         parts = zip(self.waters.model.effects, self.waters.model.split(self.effects), strict=True)

@@ -53,10 +53,14 @@ class Spiral:
             "loop_height_deg_s": degrees(down - up) if width > 0.0 else 0.0,
             "neutral_rudder_deg": degrees(neutral),
         }
-        for name, values in (("from_starboard_deg_s", 1), ("from_port_deg_s", -1)):
-            for k, order in enumerate(self.orders_rad):
-                falling, rising = self._direct(rudder, rate, order, middle)
-                figures[f"{name}.{k}"] = degrees(falling if values == 1 else rising)
+        orders = self.orders_rad
+        for name, side in (("from_starboard_deg_s", 1), ("from_port_deg_s", -1)):
+            # the outermost one is come to from amidships, every other from the side of the way
+            outermost = 0 if side > 0 else len(orders) - 1
+            for k, order in enumerate(orders):
+                felt = ship.felt_rad(order) if k == outermost else order + side * ship.lost_rad
+                falling, rising = self._direct(rudder, rate, felt, middle)
+                figures[f"{name}.{k}"] = degrees(falling if side > 0 else rising)
         reach = Reach(
             max(float(np.arctan2(abs(b.lateral_m_s), b.forward_m_s)) for b in balances),
             max(abs(b.yaw_rate_rad_s) * ship.waters.length_m / b.forward_m_s for b in balances),

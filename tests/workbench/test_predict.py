@@ -125,7 +125,7 @@ def test_a_circle_sailed_in_the_wind_lies_within_what_the_wind_of_the_zigzags_do
     figures = {one["figure"]: one for one in measured["figures"]}
     assert {"advance_m", "transfer_m", "tactical_diameter_m", "steady_yaw_rate_deg_s"} <= set(figures)
     assert all(one["agrees"] for one in figures.values()), figures
-    assert any("wind force of these is not known" in words for words in shown["judged"])
+    assert any("wind force of these manoeuvres is not known" in words for words in shown["judged"])
     # in calm water none of them is as wide
     for name, figure in shown["figures"].items():
         if name in ("transfer_m", "tactical_diameter_m"):

@@ -38,15 +38,16 @@ def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     ]
     sentences = [first]
     if widths:
+        others = len(predicted) - len(widths)
         sentences.append(
             f"half an interval is {_percent(median(widths))} % of what is predicted in the median, "
-            f"{_percent(max(widths))} % at most"
+            f"{_percent(max(widths))} % at most{f'; {others} intervals about nothing are left out' if others else ''}"
         )
     unknown = max((run.wind_force_std_m_s2 for run in measured if run.wind_force_m_s2 == 0.0), default=0.0)
     if unknown > 0.0:
         sentences.append(
-            f"the wind force of these is not known: the intervals hold one of {unknown:.2g} m/s^2 to either side (one "
-            "standard error), as large as in the zigzags of the set"
+            "the wind force of these manoeuvres is not known: the intervals allow for one of either sign with a "
+            f"standard error of {unknown:.2g} m/s^2, as large as in the zigzags of the set"
         )
     if agree < _MOST * len(figures):
         sentences.append(_LACKS)
