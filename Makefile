@@ -56,7 +56,7 @@ bench: $(RIVALS)
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
-	for name in identify.captive_twin identify.information_limit identify.intervals_as_sold identify.changes identify.no_log identify.paper_map diagnose.hidden_effects \
+	for name in identify.captive_twin identify.information_limit identify.intervals_as_sold identify.changes identify.no_log identify.paper_map diagnose.hidden_effects diagnose.parted \
 		ingest.doctor fleet.fleet fleet.history_speed fleet.kill fleet.kill_dask fleet.kill_torn ingest.fuzz; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 

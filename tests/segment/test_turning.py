@@ -340,6 +340,16 @@ def test_spiral_of_an_unstable_ship_shows_her_loop() -> None:
     assert spiral.figures["loop_height_deg_s"].value == pytest.approx(2.0 * np.sqrt(0.5), rel=0.1)
 
 
+def test_ways_that_hold_no_angle_in_common_cannot_show_a_loop() -> None:
+    ship = Ship()
+    for angle in (15.0, 9.0, 3.0, -3.0, -9.0, -15.0, -6.0, 0.0, 6.0, 12.0):
+        ship.wait(angle, 180.0)
+    (spiral,) = tiny(ship)
+    assert isinstance(spiral, Spiral)
+    assert (spiral.loop, spiral.n_ways) == ("not judged", 2)
+    assert spiral.reasons == ("The two ways hold no rudder angle in common: a loop cannot be seen.",)
+
+
 def test_one_way_of_a_spiral_cannot_show_a_loop() -> None:
     ship = Ship()
     for angle in (20.0, 10.0, 5.0, 0.0, -5.0, -10.0, -20.0):
