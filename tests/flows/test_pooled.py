@@ -150,7 +150,9 @@ def test_a_prediction_lays_out_the_manoeuvres_of_its_set_once_and_others_alike(
             return assembled(warehouse, chosen, *rest)
 
         def filtered(run, *rest, runs=runs):
-            runs[run.name] = run
+            # those of the set, by their own names, say how large the wind is where a zigzag has no run
+            if run.name.startswith("seg-"):
+                runs[run.name] = run
             return RunFilter(run, *rest)
 
         monkeypatch.setattr(as_sailed_job, "assembled", laid_out)
