@@ -23,8 +23,8 @@ from kempf.pipeline.estimate.filtered import Passed, RunFilter
 
 #: a leg begins where the rudder has come to this share of its largest angle on the other side
 _OVER = 0.5
-#: step of the difference quotients, in standard errors
-_STEP = 0.1
+#: steps of the difference quotients, in standard errors: the first at which no filter runs away
+_STEPS = (0.1, 0.01, 0.001)
 #: so few legs say nothing
 _FEWEST = 6
 
@@ -46,11 +46,16 @@ def widening(filters: Sequence[RunFilter], levels: Sequence[Float], hull: Float,
     free = np.flatnonzero(std > 0.0)
     if free.size == 0:
         return 1.0
-    slopes = [_slopes(*pair, hull, values, _STEP * std, free) for pair in zip(filters, levels, strict=True)]
-    parts = [_by_legs(one.run.rudder_rad, own) for one, own in zip(filters, slopes, strict=True)]
+    every = [(one, _slopes(one, own, hull, values, std, free)) for one, own in zip(filters, levels, strict=True)]
+    # a manoeuvre in which the model runs away at the least change of a parameter says nothing
+    used = [(one, own) for one, own in every if own is not None]
+    if not used:
+        return 1.0
+    slopes = [own for _, own in used]
+    parts = [_by_legs(one.run.rudder_rad, own) for one, own in used]
     count = sum(map(len, parts))
-    of_log = np.repeat([one.run.day for one in filters], list(map(len, parts)))
-    unsure = {one.run.day for one in filters if not one.run.instant_errors.known}
+    of_log = np.repeat([one.run.day for one, _ in used], list(map(len, parts)))
+    unsure = {one.run.day for one, _ in used if not one.run.instant_errors.known}
     # of the others the maximum takes one mean off, that of all
     legs, means = np.concatenate(parts), max(len(unsure), 1)
     for day in sorted(unsure):
@@ -63,18 +68,26 @@ def widening(filters: Sequence[RunFilter], levels: Sequence[Float], hull: Float,
     return float(np.sqrt(max(mean, 1.0))) if np.isfinite(mean) else 1.0
 
 
-def _slopes(run_filter: RunFilter, levels: Float, hull: Float, values: Float, steps: Float, free: np.ndarray) -> Float:
-    """Return what every instant adds to the scores of the free parameters, a tenth of an error each, (n, free)."""
+def _slopes(
+    run_filter: RunFilter, levels: Float, hull: Float, values: Float, std: Float, free: np.ndarray
+) -> Float | None:
+    """Return what every instant adds to the scores of the free parameters, in their errors, shape (n, free).
+
+    None where the filter runs away however little they are moved.
+    """
     theta = np.concatenate([hull, values])
-    moved = np.repeat(theta[:, None], 2 * free.size, axis=1)
-    for k, parameter in enumerate(free):
-        moved[parameter, 2 * k] += steps[parameter]
-        moved[parameter, 2 * k + 1] -= steps[parameter]
-    passes = run_filter.run_filters(moved[:6], np.repeat(levels[:, None], 2 * free.size, axis=1), moved[6:])
-    at = np.column_stack([_log_likelihoods(passed) for passed in passes])
-    # in units of the steps: the matrices are well scaled, and the factor is the same in any
-    slopes: Float = 0.5 * (at[:, 0::2] - at[:, 1::2])
-    return slopes
+    for step in _STEPS:
+        moved = np.repeat(theta[:, None], 2 * free.size, axis=1)
+        for k, parameter in enumerate(free):
+            moved[parameter, 2 * k] += step * std[parameter]
+            moved[parameter, 2 * k + 1] -= step * std[parameter]
+        passes = run_filter.run_filters(moved[:6], np.repeat(levels[:, None], 2 * free.size, axis=1), moved[6:])
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            at = np.column_stack([_log_likelihoods(passed) for passed in passes])
+            slopes: Float = (at[:, 0::2] - at[:, 1::2]) / (2.0 * step)
+        if np.all(np.isfinite(slopes)):
+            return slopes
+    return None
 
 
 def _by_legs(rudder_rad: Float, slopes: Float) -> Float:

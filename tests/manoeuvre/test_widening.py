@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.instant_errors import InstantErrors
-from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.manoeuvre import widening as widening_job
 from kempf.pipeline.manoeuvre.widening import widening
 from kempf.pipeline.model.effect_model import EffectModel
 from tests.estimate.test_plain_fit import SPEC, fitted, run
@@ -66,3 +68,20 @@ def test_a_few_legs_say_nothing(three: PooledFit) -> None:
     still = replace(short, inputs=np.where(np.arange(short.inputs.shape[1]) == 1, 0.1, short.inputs))
     filters = [RunFilter(still, EffectModel(), SPEC)]
     assert widening(filters, [np.exp(three.levels[0])], three.hull, np.zeros(0), three.std) == 1.0
+
+
+def test_a_filter_that_runs_away_is_moved_less_and_else_says_nothing(
+    three: PooledFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole, read, moves = factor(three), widening_job._log_likelihoods, 0
+
+    def runs_away(passed: Passed) -> Float:
+        nonlocal moves
+        moves += 1
+        # the first of the manoeuvres at the first step alone
+        return np.full(len(passed.innovation), np.nan) if moves <= 12 else read(passed)
+
+    monkeypatch.setattr(widening_job, "_log_likelihoods", runs_away)
+    assert factor(three) == pytest.approx(whole, rel=0.05)
+    monkeypatch.setattr(widening_job, "_log_likelihoods", lambda passed: np.full(len(passed.innovation), np.nan))
+    assert factor(three) == 1.0
