@@ -59,7 +59,7 @@ def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
     place : int or None
         Of a list, from 0.
     manoeuvre : mapping
-        JSON content of the manoeuvre; a spiral has ``orders_deg``.
+        JSON content of the manoeuvre, predicted or measured; a spiral has ``orders_deg``.
 
     Examples
     --------
@@ -69,7 +69,7 @@ def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
     words = FIGURES[name][0]
     if place is None:
         return words
-    if "orders_deg" in manoeuvre:
+    if manoeuvre.get("orders_deg"):
         # no minus before a nought
         return f"{words} {round(manoeuvre['orders_deg'][place], 1) + 0.0:g} deg"
     return f"{words} {place + 1}"

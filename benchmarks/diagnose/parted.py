@@ -9,9 +9,9 @@ model, with all three days. ``--work DIR`` keeps what was found, ship by ship.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from functools import partial
@@ -20,7 +20,6 @@ from pathlib import Path
 from shutil import copytree
 from tempfile import TemporaryDirectory
 from typing import Any
-from unittest.mock import patch
 
 import numpy as np
 
@@ -32,13 +31,12 @@ from benchmarks.diagnose.hidden_effects.sail import VoyageFailed
 from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.tally import Share
 from benchmarks.diagnose.hidden_effects.write import logs_of
+from benchmarks.diagnose.one_hidden_effect import kept
 from kempf.flows.jobs.add_effect import add_effect
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.next_trial import next_trial
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
-from kempf.pipeline.channels.series import Float
-from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import TrialSettings
 from kempf.schemas.errors import KempfError
@@ -48,7 +46,7 @@ _SEED, _CASES, _SHIPS = 20261129, 336, 12
 _STANDARD_DEG = (20.0, 20.0)
 #: Of the cases: the third day is another month, with a weather and noise of its own.
 _OTHER_DAY, _LATER_DAYS = 7919, 400
-_LEGS, _STEADY_LENGTHS, _LONGEST_LENGTHS = 5.0, 20.0, 100.0
+_LEGS = 5.0
 
 
 @dataclass(frozen=True)
@@ -66,25 +64,14 @@ class Parted:
     after_standard: tuple[str, ...]
 
 
-def orders(angles_deg: tuple[float, float], hull: SimulatedHull, seed: int, day: int) -> Float:
-    """Return a programme of one zigzag, as `benchmarks.diagnose.hidden_effects.programme.orders` does of several."""
-    heading = float(np.random.default_rng([seed, day]).uniform(0.0, 2.0 * np.pi))
-    own_s, shaft, depth = hull.length_m / hull.trial_speed_m_s, hull.shaft_speed_per_s, 10.0 * hull.draught_m
-    psi, delta = map(radians, angles_deg)
-    return np.array(
-        [
-            [0.0, _STEADY_LENGTHS * own_s, heading, 0.0, 0.0, 0.0, 0.0, shaft, depth],
-            [1.0, _LONGEST_LENGTHS * own_s, heading, psi, delta, 1.0, _LEGS, shaft, depth],
-        ]
-    )
-
-
 def third_day(case: Case, c: float, angles_deg: tuple[float, float]) -> tuple[str, bytes]:
     """Let the plant sail one zigzag more; return name and bytes of its log."""
     hull, seed = programme.ship(case.hull, case.seed), case.seed + _OTHER_DAY
     weather = programme.weather(hull, case.disturbance, seed, 1)
-    with patch.object(programme, "orders", partial(orders, angles_deg)):
-        voyage = sail.voyage(hull, weather, case.hidden, c, seed, 1)
+    heading, psi, delta = float(np.random.default_rng([seed, 1]).uniform(0.0, 2.0 * np.pi)), *map(radians, angles_deg)
+    around = (hull.shaft_speed_per_s, 10.0 * hull.draught_m)
+    orders = np.array(programme.zigzag(hull, heading, (psi, delta), 1.0, _LEGS, *around))
+    voyage = sail.by_orders(orders, hull, weather, case.hidden, c, seed, 1)
     settings = TrialSettings(
         hull, (), instruments=readings.instruments(hull), seed=seed, noise_scale=case.noise,
         start_utc_ns=round((datetime(2025, 1, 5, 6, tzinfo=UTC).timestamp() + _LATER_DAYS * 86400.0) * 1e9),
@@ -140,17 +127,15 @@ def cases(seed: int) -> Iterator[Case]:
             yield case
 
 
-def _kept(case: Case, work: Path | None) -> Parted | None:
-    path = None if work is None else work / f"{case.case_id}.json"
-    if path is not None and path.exists():
-        known: dict[str, Any] | None = json.loads(path.read_text(encoding="utf-8"))
-        return (
-            None if known is None else Parted(**{k: tuple(v) if isinstance(v, list) else v for k, v in known.items()})
-        )
+def _content(case: Case) -> dict[str, Any]:
+    """Return what became of a ship as JSON content, empty where nothing was to be parted."""
     found = parted(case)
-    if path is not None:
-        path.write_text(json.dumps(None if found is None else asdict(found)), encoding="utf-8")
-    return found
+    return {} if found is None else asdict(found)
+
+
+def _kept(case: Case, work: Path) -> Parted | None:
+    content = kept(work / f"{case.case_id}.json", partial(_content, case))
+    return Parted(**{k: tuple(v) if isinstance(v, list) else v for k, v in content.items()}) if content else None
 
 
 def page(found: list[Parted], looked_at: int) -> list[str]:
@@ -195,15 +180,15 @@ def main() -> None:
     parser.add_argument("--ships", type=int, default=_SHIPS, help="how many with something to be parted")
     parser.add_argument("--work", type=Path)
     given = parser.parse_args()
-    if given.work is not None:
-        given.work.mkdir(parents=True, exist_ok=True)
     found: list[Parted] = []
     looked_at = 0
-    with ProcessPoolExecutor(2) as workers:
+    with nullcontext(given.work) if given.work else TemporaryDirectory() as place, ProcessPoolExecutor(2) as workers:
+        work = Path(place)
+        work.mkdir(parents=True, exist_ok=True)
         drawn = list(cases(_SEED))
         # as many at a time as there are processes: no more ships are sailed than are shown
         for pair in zip(drawn[::2], drawn[1::2], strict=False):
-            for one in workers.map(partial(_kept, work=given.work), pair):
+            for one in workers.map(partial(_kept, work=work), pair):
                 looked_at += 1
                 found += [one] if one is not None else []
                 print(f"{looked_at} ships, {len(found)} with something to be parted: {one}", flush=True)

@@ -19,8 +19,6 @@ Complex = NDArray[np.complex128]
 _PART, _LEAST_S = 0.25, 1.0
 #: instants at which what acts from then on is read
 _INSTANTS = 400
-#: of which the first that the log has shows the speed along the bow
-_SPEEDS = ("speed_through_water", "speed_over_ground")
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,8 @@ def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_ti
     before = round(max(_PART * own_time_s, _LEAST_S) * SECOND_NS)
     at = np.linspace(execute_utc_ns - before, execute_utc_ns, 21).round().astype(np.int64)
     later = np.linspace(execute_utc_ns, end_utc_ns, _INSTANTS).round().astype(np.int64)
-    forward, rate = _mean(_forward(instruments, at)), _mean(_read(instruments, "yaw_rate", at))
+    along_bow, channel = _forward(instruments, at)
+    forward, rate = _mean(along_bow), _mean(_read(instruments, "yaw_rate", at))
     wind = _wind(instruments, later)
     known = np.isfinite(wind)
     mean = complex(np.mean(wind[known])) if known.mean() > 0.5 else 0.0 + 0.0j
@@ -71,9 +70,8 @@ def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_ti
     air = np.column_stack([since, wind[known].real, wind[known].imag])
     shaft = _mean(_read(instruments, "shaft_speed", later))
     start = Start(forward_m_s=forward, yaw_rate_rad_s=rate)
-    speed = next((name for name in _SPEEDS if np.isfinite(_read(instruments, name, at)).any()), _SPEEDS[-1])
     std = Start(
-        forward_m_s=_std(instruments, speed, before / SECOND_NS),
+        forward_m_s=_std(instruments, channel, before / SECOND_NS),
         yaw_rate_rad_s=_std(instruments, "yaw_rate", before / SECOND_NS),
     )
     return Began(start, std, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0])
@@ -102,14 +100,13 @@ def _read(instruments: Instruments, channel: str, at: Nanoseconds) -> Float:
     return values
 
 
-def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
-    """Return the speed along the bow, through the water where a log shows that, else over ground."""
-    water, over_ground = (_read(instruments, name, at) for name in _SPEEDS)
+def _forward(instruments: Instruments, at: Nanoseconds) -> tuple[Float, str]:
+    """Return the speed along the bow, through the water where a log shows that, else over ground, and its channel."""
+    water = _read(instruments, "speed_through_water", at)
     if np.isfinite(water).any():
-        return water
+        return water, "speed_through_water"
     away = _read(instruments, "course_over_ground", at) - _read(instruments, "heading", at)
-    speed: Float = over_ground * np.cos(away)
-    return speed
+    return _read(instruments, "speed_over_ground", at) * np.cos(away), "speed_over_ground"
 
 
 def _wind(instruments: Instruments, at: Nanoseconds) -> Complex:

@@ -205,9 +205,7 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         for beside in run.figures:
             figure = beside.predicted
             base, _, place = beside.name.partition(".")
-            words = in_words(
-                base, int(place) if place else None, {"orders_deg": run.orders_deg} if run.orders_deg else {}
-            )
+            words = in_words(base, int(place) if place else None, vars(run))
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
                 about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)

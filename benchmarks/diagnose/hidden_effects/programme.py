@@ -82,16 +82,38 @@ def orders(hull: SimulatedHull, seed: int, day: int) -> Float:
     time_s = hull.length_m / hull.trial_speed_m_s
     heading = random.uniform(0.0, 2.0 * pi)
     turning = 1.0 if random.random() < 0.5 else -1.0
-    rows = []
+    rows: list[list[float]] = []
     for run, (degrees, side) in enumerate(RUNS[day][: _RUNS_OF_SLOW if time_s > _SLOW_S else None]):
         shaft = hull.shaft_speed_per_s * (1.0 if run == 0 else float(random.choice([1.0, 0.9, 0.8])))
         depth = hull.draught_m * float(random.choice([2.0, 3.0, 5.0, 10.0]))
         legs = float(random.integers(5, 7 if time_s > _SLOW_S else 8)) * (2.0 if time_s < QUICK_SHIP_S else 1.0)
-        rows.append([0.0, _STEADY_LENGTHS * time_s, heading, 0.0, 0.0, 0.0, 0.0, shaft, depth])
-        angle = radians(degrees)
-        rows.append([1.0, _LONGEST_LENGTHS * time_s, heading, angle, angle, side, legs, shaft, depth])
+        rows += zigzag(hull, heading, (radians(degrees), radians(degrees)), side, legs, shaft, depth)
         heading += turning * radians(random.uniform(35.0, 70.0))
     return np.array(rows)
+
+
+def zigzag(
+    hull: SimulatedHull,
+    heading_rad: float,
+    angles_rad: tuple[float, float],
+    side: float,
+    legs: float,
+    shaft_per_s: float,
+    depth_m: float,
+) -> list[list[float]]:
+    """Return a steady course and a zigzag as two rows of a programme.
+
+    Parameters
+    ----------
+    angles_rad : (float, float)
+        psi0 and delta0.
+    """
+    time_s = hull.length_m / hull.trial_speed_m_s
+    around = (shaft_per_s, depth_m)
+    return [
+        [0.0, _STEADY_LENGTHS * time_s, heading_rad, 0.0, 0.0, 0.0, 0.0, *around],
+        [1.0, _LONGEST_LENGTHS * time_s, heading_rad, *angles_rad, side, legs, *around],
+    ]
 
 
 @dataclass(frozen=True)

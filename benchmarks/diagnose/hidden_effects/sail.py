@@ -70,16 +70,31 @@ def constants(hull: SimulatedHull, wave_from_rad: float) -> Float:
 def voyage(
     hull: SimulatedHull, weather: programme.Weather, effect: HiddenEffect | None, c: float, seed: int, day: int
 ) -> Voyage:
+    """Sail a day by its programme, see `by_orders`."""
+    return by_orders(programme.orders(hull, seed, day), hull, weather, effect, c, seed, day)
+
+
+def by_orders(
+    orders: Float,
+    hull: SimulatedHull,
+    weather: programme.Weather,
+    effect: HiddenEffect | None,
+    c: float,
+    seed: int,
+    day: int,
+) -> Voyage:
     """Sail a day.
 
     Parameters
     ----------
+    orders : ndarray, shape (n, 9)
+        As `programme.orders` gives them.
     effect : HiddenEffect or None
         None: eq. (16).
     c : float
         Its parameter.
     seed : int
-        Of the programme and of everything random; not of the effect.
+        Of everything random; not of the effect.
     day : int
         0 or 1.
 
@@ -88,7 +103,7 @@ def voyage(
     VoyageFailed
         She left the range of the model, or a zigzag was not finished.
     """
-    orders, step_s = programme.orders(hull, seed, day), programme.grid_s(hull)
+    step_s = programme.grid_s(hull)
     n = int(np.sum(np.rint(orders[:, plant.LONGEST_] / step_s))) + 1
     states, logged, fed = np.zeros((n, plant.N_STATE)), np.zeros(n), np.zeros(n)
     conditions, run = np.zeros((n, plant.N_CONDITIONS)), np.zeros(n, dtype=np.int64)

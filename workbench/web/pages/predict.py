@@ -63,11 +63,9 @@ def _rows(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _measured(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for manoeuvre in prediction["measured"]:
-        # one that an earlier version made has no orders
-        orders = {"orders_deg": manoeuvre["orders_deg"]} if manoeuvre.get("orders_deg") else {}
         for figure in manoeuvre["figures"]:
             name, _, place = figure["figure"].partition(".")
-            words = in_words(name, int(place) if place else None, orders)
+            words = in_words(name, int(place) if place else None, manoeuvre)
             yield {
                 **figure,
                 "words": words,
