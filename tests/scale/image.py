@@ -15,6 +15,8 @@ from numba.core.caching import _CacheLocator
 from tests.scale.servers import ROOT, environment
 
 DOCKERFILE = ROOT / "deploy" / "Dockerfile"
+#: Settings of the image that are others here: what an import compiles by itself takes the tests half a minute for all.
+_AS_A_TEST = {"UV_COMPILE_BYTECODE": "0"}
 #: Folders of the image that a step or a service names.
 _OF_THE_IMAGE = re.compile(r"(?<![\w/:.])/(?=(?:app|data|home|opt|src|tmp)\b)")
 
@@ -81,7 +83,7 @@ def build(root: Path, given: Mapping[str, str]) -> Image:  # noqa: PLR0912 - a b
             arguments[name] = given.get(name, default.strip('"'))
         elif word == "ENV":
             name, _, value = rest.partition("=")
-            settings[name] = value
+            settings[name] = _AS_A_TEST.get(name, value)
             if name == "NUMBA_CACHE_DIR" and stages == 1:
                 _lay_kernels(root, Path(within(root, value)))
                 # what a builder without them would compile is what the steps behind load
