@@ -103,7 +103,7 @@ def _hidden() -> list[str]:
     said = ", ".join(f"{many} {verdict}" for verdict, many in sorted(verdicts.items()))
     return [
         *cases,
-        f"as sold, {len(sold)} trial ships whose truth is not told here: {said}" if sold else "",
+        f"as sold, {len(sold)} trial ships whose truth is not known here: {said}" if sold else "",
     ]
 
 

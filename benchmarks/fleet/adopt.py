@@ -140,7 +140,7 @@ def tried(folder: Path, place: Path, change: Change) -> Stated:
 
 def page(found: list[Stated], verify_s: float) -> list[str]:
     """Lines of the page."""
-    head = ["change", "sets", "same bit for bit", "would move", "told as it came", "largest move, standard errors"]
+    head = ["change", "sets", "same bit for bit", "would move", "announced as it came", "largest move, standard errors"]
     rows = []
     for stated in found:
         p = stated.preview
@@ -170,8 +170,8 @@ def page(found: list[Stated], verify_s: float) -> list[str]:
     ratios = ", ".join(f"{stated.preview_s / stated.adopt_s:.2f}" for stated in found)
     verify = ", ".join(f"{stated.preview_s / verify_s:.2f}" for stated in found)
     return [
-        f"{len(HULLS)} ships ({', '.join(HULLS)}), {found[0].preview['sets']} parameter sets. *Told as it came*: sets "
-        "whose values after `kempf reprocess` are, bit for bit, those that the preview had told.",
+        f"{len(HULLS)} ships ({', '.join(HULLS)}), {found[0].preview['sets']} parameter sets. *Announced as it came*: "
+        "sets whose values after `kempf reprocess` are, bit for bit, those that the preview had announced.",
         "",
         *lines,
         f"Time of the preview over that of adopting: {ratios}; over that of `kempf rerun --all --verify`: {verify}. "
@@ -193,7 +193,7 @@ def main() -> None:
         kempf(ROOT, "rerun", "--all", "--verify", "--warehouse", str(place))
         stated = page(found, perf_counter() - begin)
     path = write(
-        "fleet.adopt", "What code would move, told before it is adopted", stated, options=f"--logs {options.logs}"
+        "fleet.adopt", "What code would move, shown before it is adopted", stated, options=f"--logs {options.logs}"
     )
     print(path.read_text(encoding="utf-8"))
 

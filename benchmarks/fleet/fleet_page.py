@@ -52,8 +52,8 @@ def lines(figures: Figures) -> list[str]:
         "Each Dask worker is a process that may use one core. Prefect's share counts all time that a thread was not "
         "inside a batch: also waiting for the others at the end. Beside plain threads that do the same batches, in "
         "turns, each figure is the median of the pairs and, in brackets, the least and the greatest of them: a share "
-        "smaller than that spread is not told from noise. Time of the processor is that of the process that runs the "
-        "flow; the server's is not in it, but it is on the clock.",
+        "smaller than that spread cannot be distinguished from noise. Time of the processor is that of the process "
+        "that runs the flow; the server's is not in it, but it is on the clock.",
         "",
         "## Cost against the size of the fleet",
         "",

@@ -1,4 +1,4 @@
-"""Ten nights of a small fleet on a real Prefect server: what the operator is told each morning.
+"""Ten nights of a small fleet on a real Prefect server: what the operator reads each morning.
 
 ``python -m benchmarks.fleet.ten_nights``. Logs arrive, a folder has a slip of the hand in its name, a log is damaged, a
 machine is switched off in the middle of a run, the code gets a remark, a zigzag is excluded and taken in again. Every
@@ -322,7 +322,7 @@ def main() -> None:
         settings = {PREFECT_API_URL: here.env["PREFECT_API_URL"], PREFECT_HOME: here.env["PREFECT_HOME"]}
         with temporary_settings(settings):
             found = nights(here)
-    write("fleet.ten_nights", "Ten nights, and what the operator is told", page(found))
+    write("fleet.ten_nights", "Ten nights, and what the operator reads", page(found))
 
 
 if __name__ == "__main__":

@@ -92,7 +92,7 @@ def _tails(e: Float, random: np.random.Generator) -> Float:
 #: What is wrong with the covariances, by its description.
 WORLDS: dict[str, Spoil] = {
     "covariances true": lambda e, _: e,
-    "standard errors told 1.3 times too small": lambda e, _: 1.3 * e,
+    "standard errors stated 1.3 times too small": lambda e, _: 1.3 * e,
     "one set in five has standard errors half the truth": _some_worse,
     "errors with the tails of Student's t, 5 degrees of freedom": _tails,
     "every parameter scatters by 1 % between trials": lambda e, r: e + 0.01 * r.standard_normal(e.shape),
@@ -136,8 +136,8 @@ def rivals(one: ParameterHistory, draws: int = 199) -> tuple[bool, bool]:
     ratio = np.einsum("ska,kab,skb->sk", left, middle, left).max(axis=1)
     total = np.einsum("sia,iab,sib->s", y - mean[:, None], J, y - mean[:, None])
     scaled = ratio / (total - ratio)
-    as_told, with_scale = ((1 + np.sum(x[1:] >= x[0])) / (draws + 1) <= SETTINGS.level for x in (ratio, scaled))
-    return bool(as_told), bool(with_scale)
+    as_stated, with_scale = ((1 + np.sum(x[1:] >= x[0])) / (draws + 1) <= SETTINGS.level for x in (ratio, scaled))
+    return bool(as_stated), bool(with_scale)
 
 
 @dataclass(frozen=True)
@@ -381,7 +381,7 @@ def page(
         "",
         "## Power, % of histories reported",
         "",
-        "Every parameter scatters by 1 % between trials; a step comes midway, a drift is told by what it adds up to.",
+        "Every parameter scatters by 1 % between trials; a step comes midway, a drift is given by what it adds up to.",
         "",
         *table(
             ["change", "sets", *(f"{100 * s:g} %" for s in SIZES)],
@@ -398,7 +398,7 @@ def page(
                 "time interval holds the time, %",
                 "all six intervals hold the truth, %",
                 "names a parameter that did not change, %",
-                "more than one change told, %",
+                "more than one change reported, %",
             ],
             [
                 [
@@ -412,8 +412,8 @@ def page(
             ],
         ),
         "",
-        f"b2 up by 6 % after 8 of 24 sets and back after 16: two steps told in {back[0]} % of {back[0].n} histories, "
-        f"both times inside their intervals in {back[1]} % of those.",
+        f"b2 up by 6 % after 8 of 24 sets and back after 16: two steps reported in {back[0]} % of {back[0].n} "
+        f"histories, both times inside their intervals in {back[1]} % of those.",
         "",
         "## Looking again after every new set",
         "",

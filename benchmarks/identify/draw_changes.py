@@ -44,7 +44,7 @@ def draw_changes(
         spans = [alarms[w][n].interval for w in worlds]
         error = [[a - s[0] for a, s in zip(x, spans, strict=True)], [s[1] - a for a, s in zip(x, spans, strict=True)]]
         panel.errorbar(x, y, xerr=error, fmt="o", ms=4, lw=1, color=plt.cm.viridis(i / len(lengths)), label=f"{n} sets")
-    for which, mark, name in ((0, "x", "six-vector, covariances as told"), (1, "+", "six-vector, one scale factor")):
+    for which, mark, name in ((0, "x", "six-vector, covariances as stated"), (1, "+", "six-vector, one scale factor")):
         x = [max(rival[w][which].percent, 0.5) for w in worlds]
         panel.plot(x, range(len(worlds)), mark, color="tab:red", ms=8, mew=1.5, label=f"rival: {name}, 20 sets")
     panel.axvline(100 * settings.level, color="0.3", lw=1, ls="--")

@@ -16,7 +16,7 @@ from matplotlib.colors import LogNorm
 from kempf.pipeline.channels.series import Float
 
 _CAUSES = {
-    "foretold": ("foretold by the attenuation", "k--"),
+    "predicted": ("predicted by the attenuation", "k--"),
     "undisturbed": ("(14), true disturbances taken off", "ko"),
     "settled": ("procedure, settling left out", "C0.-"),
     "written": ("procedure as written", "C3.-"),

@@ -172,13 +172,13 @@ def survey(seeds: list[int]) -> tuple[list[Cell], list[Cell]]:
 
 def dissected(seeds: list[int]) -> dict[str, Float]:
     """Mean errors under constant disturbances by cause, each shape (n_noise, 6)."""
-    rows: dict[str, list[Float]] = {name: [] for name in ("foretold", "undisturbed", "settled", "written")}
+    rows: dict[str, list[Float]] = {name: [] for name in ("predicted", "undisturbed", "settled", "written")}
     for noise in NOISES:
         found: dict[str, list[Float]] = {name: [] for name in rows}
         for seed in seeds:
             sailed = sail(noise, 0.0, seed)
             skip = round(SETTLING_S / sailed.sampled.step_s)
-            found["foretold"].append(attenuated(sailed, noise))
+            found["predicted"].append(attenuated(sailed, noise))
             found["undisturbed"].append(undisturbed(sailed))
             found["settled"].append(run(sailed, 0.0, ProcedureSettings(skip=skip))[1])
             found["written"].append(run(sailed, 0.0, ProcedureSettings())[1])
@@ -203,7 +203,7 @@ def map_table(cells: list[Cell]) -> list[str]:
 def cause_table(parts: dict[str, Float]) -> list[str]:
     """Errors by cause, one row a noise and cause."""
     stated = {
-        "foretold": "foretold, [A B] M (M + R)^-1",
+        "predicted": "predicted, [A B] M (M + R)^-1",
         "undisturbed": "(14) with the true disturbances taken off",
         "settled": f"the procedure, first {SETTLING_S:g} s left out",
         "written": "the procedure as written",
@@ -270,14 +270,14 @@ def reasons(parts: dict[str, Float]) -> list[str]:
     """What the table of causes says, with its figures."""
     loud = [k for k, noise in enumerate(NOISES) if noise >= 0.1]
     grown = parts["undisturbed"] - parts["undisturbed"][0]
-    ratio = [float(np.median(grown[k] / parts["foretold"][k])) for k in loud]
+    ratio = [float(np.median(grown[k] / parts["predicted"][k])) for k in loud]
     seen = ", ".join(f"{r:.2f} at noise {NOISES[k]:g}" for r, k in zip(ratio, loud, strict=True))
     written, settled = parts["written"][0], parts["settled"][0]
     last = {name: float(np.max(np.abs(values[-1]))) for name, values in parts.items()}
     return [
         "- Noise in the regressors. With the true disturbances taken off, the part of the error "
         "that comes with noise is the",
-        f"  foretold one: seen over foretold, median of the six parameters, {seen}. A longer record does not mend it.",
+        f"  predicted one: seen over predicted, median of the six parameters, {seen}. A longer record does not help.",
         f"- The settling of the filter. At noise {NOISES[0]:g} the procedure as written leaves "
         f"{written[0]:+.1f} % in a11, {written[1]:+.1f} % in a12 and",
         f"  {written[4]:+.1f} % in b1; with the first {SETTLING_S:g} s left out of the regressions {settled[0]:+.1f}, "

@@ -1,4 +1,4 @@
-"""How often the channel doctor finds a fault, and how often it cries wolf: ``python -m benchmarks.ingest.doctor``.
+"""How often the channel doctor finds a fault, and how often it raises a false alarm.
 
 The thresholds are those of the instruments' and ships' physics; what was tuned at all was tuned on seeds below 1000.
 Here are the real traps, simulated logs of seeds from 1000 on, and the trial logs of seven ships.
@@ -24,7 +24,7 @@ from kempf.pipeline.channels.doctor.examine import Examination, examine
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.schemas.profile import ChannelMap
 
-_FIRST_SEED, _LOGS_A_LIE = 1000, 10
+_FIRST_SEED, _LOGS_A_FAULT = 1000, 10
 #: Sizes of the figure: heading turned, deg; yaw rate late, s.
 _TURNS_DEG, _DELAYS_S = (4.0, 8.0, 12.0, 16.0, 24.0, 32.0), (0.5, 1.0, 2.0, 3.0, 4.0, 6.0)
 
@@ -92,12 +92,12 @@ def _mends(fault: dict[str, object]) -> tuple[object, ...]:
     return tuple(Correction(key, ChannelMap.model_validate(entry)) for key, entry in entries.items())
 
 
-def lie_about(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float, float]:
+def with_faults(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float, float]:
     scores, doctor_s, eye_s = {}, 0.0, 0.0
     for place, (what, fault) in enumerate(FAULTS.items()):
         score = scores[what] = Score()
         fitting = [one for one in logs if NEEDS.get(what, "heading") in one[1].series]
-        for k in range(_LOGS_A_LIE):
+        for k in range(_LOGS_A_FAULT):
             name, log = fitting[(place * 5 + k * 7) % len(fitting)]
             stated = fault(log, np.random.Generator(np.random.PCG64([place, k])))
             start = perf_counter()
@@ -122,18 +122,18 @@ def clean_rows(logs: Sequence[tuple[str, Log]]) -> tuple[list[list[str]], list[s
     forms = {"speed and course": lambda log: log, "earth-fixed": with_velocities, "body-fixed": with_body_velocities}
     total = eye_total = 0
     for form, changed in forms.items():
-        wolf = eye = 0
+        alarmed = eye = 0
         for name, log in logs:
-            honest = changed(log)
+            sound = changed(log)
             start = perf_counter()
-            found = examine(honest)
+            found = examine(sound)
             seconds += perf_counter() - start
-            wolf += bool(found.findings)
-            eye += bool(suspected(honest))
+            alarmed += bool(found.findings)
+            eye += bool(suspected(sound))
             if found.findings:
                 stated.append(f"{name}, {form}: {', '.join(o.check for x in found.findings for o in x.evidence)}")
-        rows.append([form, interval(wolf, len(logs)), interval(eye, len(logs))])
-        total, eye_total = total + wolf, eye_total + eye
+        rows.append([form, interval(alarmed, len(logs)), interval(eye, len(logs))])
+        total, eye_total = total + alarmed, eye_total + eye
     n = len(forms) * len(logs)
     rows.append(["all", interval(total, n), interval(eye_total, n)])
     return rows, stated, seconds / n
@@ -146,8 +146,8 @@ def by_size(logs: Sequence[tuple[str, Log]]) -> dict[str, tuple[tuple[float, ...
     def share(kind: str, channel: str, value: float) -> float:
         hits = 0
         for _, log in logs:
-            lying = Fault(kind, (channel,), value, "turned" if kind == "offset" else "late").corrected(log)  # type: ignore[arg-type]
-            hits += named(examine(lying), Stated(lying, kind, (channel,)))[0]
+            faulty = Fault(kind, (channel,), value, "turned" if kind == "offset" else "late").corrected(log)  # type: ignore[arg-type]
+            hits += named(examine(faulty), Stated(faulty, kind, (channel,)))[0]
         return hits / len(logs)
 
     return {
@@ -184,14 +184,15 @@ def draw(scores: dict[str, Score], sizes: dict[str, tuple[tuple[float, ...], lis
 def page(data: Path, many: int) -> list[str]:
     logs = [simulated(seed) for seed in range(_FIRST_SEED, _FIRST_SEED + many)] + list(fleet(data))
     traps_found = trap_rows(data)
-    clean, wolves, clean_s = clean_rows(logs)
-    scores, doctor_s, eye_s = lie_about(logs)
+    clean, alarms, clean_s = clean_rows(logs)
+    scores, doctor_s, eye_s = with_faults(logs)
     draw(scores, by_size(logs[:10]), result_page.RESULTS / "doctor.png")
     stated, found = sum(s.stated for s in scores.values()), sum(s.found for s in scores.values())
     rows = [
         [what, f"{s.found} of {s.stated}", str(s.alone), str(s.others), str(s.by_eye), ", ".join(s.missed) or "none"]
         for what, s in scores.items()
     ]
+    ships = len({name.partition(",")[0] for name, _ in logs[many:]})
     alone, eye = sum(s.alone for s in scores.values()), sum(s.by_eye for s in scores.values())
     others = sum(s.others for s in scores.values())
     rows.append(["all", interval(found, stated), interval(alone, stated), str(others), interval(eye, stated), ""])
@@ -204,7 +205,7 @@ def page(data: Path, many: int) -> list[str]:
         "",
         *result_page.table(["trap", "logs", "testable", "named alone", "then silent", "line"], traps_found),
         "",
-        f"## False findings on honest logs: {many} simulated ones and {len(logs) - many} of seven ships",
+        f"## Faults put into sound logs: {many} simulated ones and {len(logs) - many} of {ships} ships",
         "",
         "Found: the right fault of the right channel is named, alone or as one of these. Accused: another channel is "
         "named alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that "
@@ -214,16 +215,16 @@ def page(data: Path, many: int) -> list[str]:
             ["fault", "found", "named alone", "accused", "by correlations", "not found in (size)"], rows
         ),
         "",
-        "## False alarms on honest logs",
+        "## False alarms on sound logs",
         "",
         *result_page.table(["velocities as", "doctor", "correlations of pairs"], clean),
         "",
-        f"False alarms: {'; '.join(wolves) or 'none'}.",
+        f"False alarms: {'; '.join(alarms) or 'none'}.",
         "",
         "## Cost",
         "",
-        f"An honest log takes {clean_s:.2f} s, one with a fault {doctor_s / stated / clean_s:.1f} times as long; the "
-        f"correlations take {eye_s / stated / clean_s:.2f} times as long as an honest log's examination.",
+        f"A sound log takes {clean_s:.2f} s, one with a fault {doctor_s / stated / clean_s:.1f} times as long; the "
+        f"correlations take {eye_s / stated / clean_s:.2f} times as long as a sound log's examination.",
         "",
         "![Found by fault, and by the size of two of them](doctor.png)",
     ]

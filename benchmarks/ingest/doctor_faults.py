@@ -118,9 +118,9 @@ def _frame(prepare: Callable[[Log], Log], log: Log) -> Stated:
     log = prepare(log)
     earth = ("velocity_north", "velocity_east")
     channels = earth if "velocity_north" in log.series else ("velocity_forward", "velocity_starboard")
-    lying = Fault("frame", channels).corrected(log)
+    faulty = Fault("frame", channels).corrected(log)
     other = ("velocity_forward", "velocity_starboard") if channels == earth else earth
-    return Stated(lying, "frame", other)
+    return Stated(faulty, "frame", other)
 
 
 def _late(*names: str) -> PutIn:
@@ -170,4 +170,5 @@ FAULTS: dict[str, PutIn] = {
     "heading, 3 to 12 s late": _late("heading"),
     "heading, clock gains or loses 5 to 20 s": _fast("heading"),
     "yaw rate, clock gains or loses 5 to 20 s": _fast("yaw_rate"),
+    "heading and course swapped": _swapped("heading", "course_over_ground"),
 }

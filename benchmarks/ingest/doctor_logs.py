@@ -34,13 +34,13 @@ from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
 from kempf.schemas.profile import VesselProfile
 
 #: Of the eight trial ships one capsizes in the simulation, at tens of metres a second and thousands of degrees of roll:
-#: her logs are not honest ones.
+#: her logs are not sound ones.
 CAPSIZED = "ekaterina"
 _FORMATS = {"csv": to_csv, "mcap": to_mcap, "nmea": to_nmea}
 
 
 def simulated(seed: int) -> tuple[str, Log]:
-    """One honest log: hull, programme, sea, noise, antenna, format and whether the length is known, all by the seed."""
+    """One sound log: hull, programme, sea, noise, antenna, format and whether the length is known, all by the seed."""
     random = np.random.Generator(np.random.PCG64(seed))
     hull = HULLS[sorted(HULLS)[seed % len(HULLS)]]
     stream = random.uniform(0.0, min(1.0, 0.2 * hull.trial_speed_m_s))

@@ -1,4 +1,4 @@
-"""Reading NMEA 0183 beside the package that a user would take instead, and whether exactly the damaged lines are told.
+"""Reading NMEA 0183 beside the package that a user would take, and whether exactly the damaged lines are refused.
 
 Both sides start from the same bytes in memory, in turn within one process. The rival parses each line, checks its
 checksum and reads every field; ours gives channels in SI with their times, screened, with both ledgers.
@@ -40,7 +40,7 @@ class Measured:
     decoding: list[Spent]
     reading: list[Spent]
     rival: list[Spent]
-    told_wrong: str
+    refused: str
     peak_bytes_per_byte: float
 
     def ratio(self, mine: list[Spent], clock: int) -> float:
@@ -114,7 +114,7 @@ def page(found: list[Measured], lines: int) -> list[str]:
             f"{m.ratio(m.decoding, 1):.1f}",
             f"**{m.ratio(m.reading, 1):.1f}**",
             f"{m.ratio(m.reading, 0):.1f}",
-            m.told_wrong,
+            m.refused,
             f"{m.peak_bytes_per_byte:.1f}",
         ]
         for m in found
@@ -130,7 +130,7 @@ def page(found: list[Measured], lines: int) -> list[str]:
         "read / pynmea2",
         "the same on the wall",
     ]
-    head += ["wrong checksums told", "peak memory, bytes a byte"]
+    head += ["wrong checksums refused", "peak memory, bytes a byte"]
     large = [m for m in found if m.lines >= lines]
     least = min(m.ratio(m.reading, 1) for m in large)
     return [

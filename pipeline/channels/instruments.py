@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import polars as pl
 
+from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.holds import find_held
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
@@ -89,6 +90,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         sources |= dict.fromkeys(channels, source)
         if std_s > 0.0:
             unsure |= dict.fromkeys(channels, std_s)
+    notes = [*named_gaps(series), *notes]
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)

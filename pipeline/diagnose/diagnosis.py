@@ -18,7 +18,7 @@ from kempf.pipeline.diagnose.by_prediction import predicting_better
 from kempf.pipeline.diagnose.final_sizes import Size, final_sizes
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Ladder
-from kempf.pipeline.diagnose.ladder_step import Step, make_step, step_of
+from kempf.pipeline.diagnose.ladder_step import Step, make_step, step_of, without_members
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.remaining_misfit import RemainingMisfit, remaining_misfit
 from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_reference_of
@@ -120,11 +120,12 @@ def diagnose(
     kept = _claimed(steps) if left else len(steps)
     ahead = steps[kept - 1].ahead
     listener.begins("sizing what was found")
-    sizes = final_sizes(steps[:kept], workers, listener)
+    claimed = without_members(steps[:kept])
+    sizes = final_sizes(claimed, workers, listener)
     return Diagnosis(
         way=tuple(fits),
         given=rungs,
-        steps=tuple(steps[:kept]),
+        steps=tuple(claimed),
         sizes=sizes,
         imitating=tuple(steps[kept:]),
         something_left=left,

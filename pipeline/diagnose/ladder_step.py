@@ -136,6 +136,20 @@ def make_step(
     return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead, legs)
 
 
+def without_members(steps: Sequence[Step]) -> list[Step]:
+    """Return rungs whose sets leave out the effects of other rungs: these stand in the model, and in no other's place.
+
+    What predicted as well as the first effect that was chosen may have been chosen beside it later.
+    """
+    own = {step.added.name for step in steps if step.added is not None}
+    return [
+        replace(
+            step, chosen_from=(*step.chosen_from[:1], *(p for p in step.chosen_from[1:] if p[0].effect.name not in own))
+        )
+        for step in steps
+    ]
+
+
 def rung(number: int, step: Step, before: Ahead | None = None, agreement: Agreement | None = None) -> dict[str, Any]:
     """Return one rung of the ladder as JSON content.
 

@@ -93,7 +93,7 @@ def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[S
     first, last = found.steps[0], found.steps[-1]
     assert first.held_out_error is not None and last.held_out_error is not None
     assert last.held_out_error < 0.5 * first.held_out_error
-    # what the wind had to stand in for is the rudder's now
+    # what the wind had to explain is the rudder's now
     assert last.intensities[0] < 0.2 * first.intensities[0]
     assert found.before is not None and found.after is not None
     assert found.after.gain < 0.2 * found.before.gain

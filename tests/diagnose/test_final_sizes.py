@@ -11,7 +11,7 @@ import pytest
 
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.final_sizes import final_sizes, refitted_size
-from kempf.pipeline.diagnose.ladder_step import Step
+from kempf.pipeline.diagnose.ladder_step import Step, without_members
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.agreement import agreement_of
@@ -35,7 +35,7 @@ def rung(fit: PooledFit, **alike: PooledFit) -> Step:
         )
         for name, one in alike.items()
     ]
-    return cast(Step, SimpleNamespace(fit=fit, chosen_from=tuple(pairs)))
+    return Step(fit, get(next(iter(alike))) if alike else None, tuple(pairs), (), (), (), ())
 
 
 def test_a_size_is_that_of_the_last_model() -> None:
@@ -52,6 +52,18 @@ def test_a_size_is_that_of_the_last_model() -> None:
     beside = fitted("dead_time", "yaw_quadratic")
     assert sizes["dead_time"].values[0] == pytest.approx(beside.values[0], abs=0.1 * beside.std[6])
     assert sizes["dead_time"].values[0] != dead.values[0]
+
+
+def test_what_was_chosen_later_is_in_the_place_of_nothing() -> None:
+    plain, lag, quadratic, last = (
+        fitted(*names) for names in ((), ("rudder_lag",), ("yaw_quadratic",), ("rudder_lag", "yaw_quadratic"))
+    )
+    steps = [rung(plain), rung(lag, rudder_lag=lag, yaw_quadratic=quadratic), rung(last, yaw_quadratic=last)]
+    settled = without_members(steps)
+    chosen = [[candidate.effect.name for candidate, _ in step.chosen_from] for step in settled]
+    assert chosen == [[], ["rudder_lag"], ["yaw_quadratic"]]
+    sizes = final_sizes(settled, WORKERS)
+    np.testing.assert_array_equal(sizes["yaw_quadratic"].values, last.values[1:])
 
 
 def test_a_last_model_that_is_the_refit_itself_asks_for_no_other() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from kempf.pipeline.channels.doctor.corrections import setting
 from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine, examine_window
-from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, UNITS, Fault
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from tests.doctor import closed_form_ship
@@ -89,6 +89,14 @@ def test_the_odd_one_out_is_named_alone_with_its_size(name: str) -> None:
     fault = found.findings[0].faults[0]
     assert fault.value == pytest.approx(expected.value, abs=max(4.0 * fault.std, 0.05 * abs(expected.value)))
     assert found.findings[0].evidence
+
+
+def test_bow_and_course_swapped_are_no_late_compass() -> None:
+    sound = closed_form_ship.log()
+    (finding,) = examine(BOW_AND_COURSE.corrected(sound)).findings
+    assert [f.key for f in finding.faults] == [BOW_AND_COURSE.key]
+    (finding,) = examine(late(sound, "heading", 9.0)).findings
+    assert {(f.kind, f.channels) for f in finding.faults} == {("latency", ("heading",)), ("latency", ("yaw_rate",))}
 
 
 def test_frames_taken_for_each_other() -> None:

@@ -12,14 +12,14 @@ from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta
 from kempf.warehouse.store import Warehouse
 
-#: Runs tell how the work went, which an interruption changes.
+#: Runs record how the work went, which an interruption changes.
 RUNS = ("runs", "run_history")
-TOLD = tuple(name for name in TABLES if name not in RUNS)
+LASTING = tuple(name for name in TABLES if name not in RUNS)
 
 
 def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
     """The rows of every table that can be reached from a recorded ingest, sorted; the raw logs by their hash."""
-    content: dict[str, list[dict[str, Any]]] = {name: delta.read(warehouse, name).rows(named=True) for name in TOLD}
+    content: dict[str, list[dict[str, Any]]] = {name: delta.read(warehouse, name).rows(named=True) for name in LASTING}
     ingests = {row["ingest_id"] for row in content["logs"]}
     for name in ("readings", "rejected", "lost", "examinations", "segments"):
         content[name] = [row for row in content[name] if row["ingest_id"] in ingests]

@@ -33,7 +33,7 @@ from tests.scale.image import Image
 from tests.scale.servers import ROOT, environment, running, wait_for
 
 DEPLOY = ROOT / "deploy"
-#: Of the services these are not Kempf's own: an S3 server of the tests stands in for the one, DuckDB for the other.
+#: Services that are not Kempf's own: the tests have an S3 server of their own, and DuckDB in place of Grafana.
 OTHERS = ("s3", "grafana")
 COMMIT = "0123456789abcdef0123456789abcdef01234567"
 VESSELS = ("ferry", "sloop")

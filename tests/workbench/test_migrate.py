@@ -31,7 +31,7 @@ from kempf.warehouse.marker import LAYOUT, Marker
 from kempf.warehouse.migrations.chain import forward
 from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
-from tests.flows.content import TOLD, seen
+from tests.flows.content import LASTING, seen
 from tests.workbench.driving import environment, kempf, refused, tree
 
 HERE = Path(__file__).parent
@@ -118,7 +118,7 @@ def test_everything_is_there_after(place: Path, since: int) -> None:
     then = content(forward(warehouse))
     done = kempf("migrate", "--yes", "--warehouse", place, "--json")
     assert done.code == 0 and (done.json["from"], done.json["to"]) == (since, LAYOUT), done
-    assert content(warehouse) == then and set(TOLD) - {"aliases"} <= then.keys()
+    assert content(warehouse) == then and set(LASTING) - {"aliases"} <= then.keys()
     assert kempf("verify", "--warehouse", place).out.strip() == "all is well"
     assert warehouse.marker() == Marker(LAYOUT)
     after = tree(place)

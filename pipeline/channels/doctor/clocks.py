@@ -43,7 +43,11 @@ def clock_figures(
 
 
 def clock_outcome(
-    name: str, sides: tuple[tuple[str, ...], tuple[str, ...]], alignment: Alignment, figures: tuple[Figure, Figure]
+    name: str,
+    sides: tuple[tuple[str, ...], tuple[str, ...]],
+    alignment: Alignment,
+    figures: tuple[Figure, Figure],
+    also: tuple[Fault, ...] = (),
 ) -> Outcome:
     """Judge two clocks by the lag of the second side behind the first and its growth.
 
@@ -57,6 +61,8 @@ def clock_outcome(
         Of their motions.
     figures : (Figure, Figure)
         From `clock_figures`.
+    also : tuple of Fault, optional
+        What looks like a lag and is none.
     """
     channels = (*sides[0], *sides[1])
     if max(alignment.left_over, alignment.varying) > _TOGETHER:
@@ -75,6 +81,7 @@ def clock_outcome(
         *_late(second, lag.value, lag.std),
         Fault("clock_scale", second, growth.value, "clock", growth.std, simplicity=2),
         Fault("clock_scale", first, -growth.value, "clock", growth.std, simplicity=2),
+        *also,
     )
     state = worst([lag.state, growth.state])
     return Outcome(name, channels, state, words, figures, alignment.left_over, suspects)

@@ -80,6 +80,10 @@ class Fault:
         return replace(corrected, refused={n: many for n, many in log.refused.items() if n not in self.channels})
 
 
+#: The course follows the bow as she drifts in a turn: in its place it looks like a compass that is late.
+BOW_AND_COURSE = Fault("swap", ("heading", "course_over_ground"), simplicity=2)
+
+
 def unit_faults(channels: tuple[str, ...], dimension: str) -> Iterator[Fault]:
     """Yield the wrong units that channels may be in, by the canonical unit of their dimension."""
     for name, factor in UNITS[dimension].items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.align import LONGEST_S, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
-from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
+from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
 from kempf.pipeline.channels.doctor.motion import moves, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
@@ -85,7 +85,8 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     if kind == "body" or not thorough:
         return [turn]
     figures = clock_figures(both, honest, heading, own)
-    return [turn, clock_outcome(names[1], (("heading",), velocity.channels), both, figures)]
+    also = (BOW_AND_COURSE,) if kind == "course" else ()
+    return [turn, clock_outcome(names[1], (("heading",), velocity.channels), both, figures, also)]
 
 
 _WORDS = {
@@ -115,6 +116,7 @@ def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
             Fault("sign", course),
             Fault("offset", course, ninety, "counted anticlockwise from east", simplicity=2),
             *unit_faults(course, "rad"),
+            BOW_AND_COURSE,
         ]
     elif kind == "track":
         faults += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]

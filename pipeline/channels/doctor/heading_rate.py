@@ -6,7 +6,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.align import LONGEST_S, Alignment, align, edges_of
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
-from kempf.pipeline.channels.doctor.faults import UNITS, Fault, unit_faults
+from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
@@ -118,4 +118,5 @@ def _turning(alignment: Alignment, span_s: float, *, another: bool) -> Outcome:
 
 def _clocks(log: Log, alignment: Alignment, usual_s: tuple[float, float]) -> Outcome:
     figures = clock_figures(alignment, usual_s, log.series["heading"])
-    return clock_outcome("heading_rate_clock", (("heading",), ("yaw_rate",)), alignment, figures)
+    also = (BOW_AND_COURSE,) if log.has(BOW_AND_COURSE.channels) else ()
+    return clock_outcome("heading_rate_clock", (("heading",), ("yaw_rate",)), alignment, figures, also)
