@@ -28,8 +28,12 @@ _TOGETHER: tuple[tuple[str, ...], ...] = (
 #: readings that are held whole: asking the tables for the columns of one instrument after the other costs a short log
 #: more than its readings take
 _SHORT = 1 << 16
-#: sentences that carry the receiver's own time of the fix; preferred where two sources are equally fast
-_OWN_CLOCK = ("RMC", "GGA", "GLL")
+#: sentences that carry the receiver's own time of the fix, and those of a compass that deviates
+_OWN_CLOCK, _MAGNETIC = ("RMC", "GGA", "GLL"), ("HDG", "HDM")
+#: talkers of displays and integrated systems, which repeat late and rounded what an instrument says
+_REPEATS = ("II", "IN")
+#: share of the most frequent source's readings from which a better one is taken, and from which one is as frequent
+_ENOUGH, _AS_MANY = 0.25, 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,14 +122,27 @@ def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
 
 
 def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) -> str:
-    """Name the source with most readings; among equals (within 2 %) one with its own clock, then by name."""
+    """Name the source that is nearest to the instrument; among equals that with most readings, then by name."""
     most = max(counts.values())
-    close = [name for name, n in counts.items() if n >= 0.98 * most]
-    chosen = min(close, key=lambda name: (name[-3:] not in _OWN_CLOCK, name))
+    enough = {name: many for name, many in counts.items() if many >= _ENOUGH * most}
+    best = min(map(_remoteness, enough))
+    equal = {name: many for name, many in enough.items() if _remoteness(name) == best}
+    chosen = min(name for name, many in equal.items() if many >= _AS_MANY * max(equal.values()))
     others = [name for name in counts if name != chosen]
     if others:
         notes.append(f"{' and '.join(group)} from {chosen}; also in {', '.join(others)}, not used")
     return chosen
+
+
+def _remoteness(source: str) -> tuple[bool, bool, bool]:
+    """Say how far a source is from the instrument: a magnetic compass, a repeater, a sentence without its own time.
+
+    Only an NMEA address of five letters says so; topics and columns are as near as any.
+    """
+    talker, sentence = source[:2], source[2:]
+    if len(source) != 5:
+        return False, False, False
+    return sentence in _MAGNETIC, talker in _REPEATS, sentence not in _OWN_CLOCK
 
 
 def _at_instants(

@@ -51,6 +51,30 @@ def test_the_source_with_most_readings_serves_the_channel() -> None:
     assert any("HCHDG" in note and "not used" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("behind", ["HCHDG", "IIHDT"])
+def test_a_compass_that_deviates_and_a_repeater_come_after_the_gyro_however_fast_they_are(behind: str) -> None:
+    slow, fast = np.arange(0.0, 100.0, 0.2), np.arange(0.0, 100.0, 0.1)
+    found = from_readings(
+        frame(("HEHDT", slow, {"heading_rad": 0.1 + 0.001 * slow}), (behind, fast, {"heading_rad": 0.1 + 0.001 * fast}))
+    )
+    assert found.sources["heading"] == "HEHDT"
+    # a gyro that was on for a tenth of the log serves none
+    few = slow[: slow.size // 10]
+    found = from_readings(
+        frame(("HEHDT", few, {"heading_rad": 0.1 + 0.001 * few}), (behind, fast, {"heading_rad": 0.1 + 0.001 * fast}))
+    )
+    assert found.sources["heading"] == behind
+
+
+def test_topics_that_are_about_as_frequent_are_taken_by_name() -> None:
+    t = np.arange(0.0, 100.0, 0.1)
+    lossy = t[np.arange(t.size) % 20 != 7]
+    found = from_readings(
+        frame(("/gyro1/heading", lossy, {"heading_rad": 0.0 * lossy}), ("/gyro2/heading", t, {"heading_rad": 0.0 * t}))
+    )
+    assert found.sources["heading"] == "/gyro1/heading"
+
+
 def test_rmc_comes_before_vtg_where_both_are_equally_fast() -> None:
     t = np.arange(0.0, 200.0)
     # one RMC in a hundred was damaged

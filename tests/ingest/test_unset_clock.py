@@ -92,7 +92,8 @@ def test_an_nmea_log_with_stamps_of_1970() -> None:
     assert stated(readings) and readings.tally.records_kept == 100
     dated = parse({"sources": [{"match": "*", "time": {"start": "2025-05-03T06:00:00Z"}}]}, "profile.yaml")
     readings = read_log("a.nmea", "".join(line + "\n" for line in lines).encode(), dated)
-    assert readings.frame["time_utc_ns"][0] == TRUE_START and not stated(readings)
+    # the middle of the second that the first stamp, of whole seconds, stands for
+    assert readings.frame["time_utc_ns"][0] == TRUE_START + SECOND // 2 and not stated(readings)
 
 
 def test_a_receiver_that_knows_the_date_sets_stamps_of_1970_right() -> None:

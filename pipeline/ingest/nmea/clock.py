@@ -9,16 +9,15 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds, Reason
 from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.nmea.receiver import fixes_of_one, speaking
+from kempf.pipeline.ingest.nmea.stamps import on_utc, spread
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
-from kempf.schemas.nmea import SATELLITES, SENTENCES
+from kempf.schemas.nmea import SENTENCES
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
 _LEAST_AGREEMENTS, _RATIO = 5, 2
-
-#: A logger's clock that leads or lags the receiver's by more than this is worth a note, s.
-_LEAD_S = 1.0
 
 #: A date that holds for no longer than this between two others that agree is that of a field updated late, ns.
 _BRIEF_NS = 60 * SECOND_NS
@@ -78,24 +77,23 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
         notes.append(
             f"{late} dates were 1024 weeks or twice that too early (the overflow of GPS weeks) and were put right."
         )
+    n = times.full.size
+    # what a receiver without a fix says counts only where no other speaks
+    fixed = times.dated & ~times.void
+    dated = fixed if fixed.any() else times.dated
     if frames.stamped:
-        stamp_ns = _set_right(frames.stamp_ns, times, notes)
-        both = times.dated & (stamp_ns != NO_TIME)
-        lead = np.median((stamp_ns - times.full)[both]) if both.any() else np.float64(0.0)
-        near = np.where(stamp_ns != NO_TIME, stamp_ns - np.int64(np.round(lead)), NO_TIME)
-        own = _nearest_day(times, near, notes)
-        if abs(lead) > _LEAD_S * SECOND_NS:
-            ahead = "ahead of" if lead > 0 else "behind"
-            seconds = abs(float(lead)) / SECOND_NS
-            notes.append(f"The logger's stamps are {seconds:.3f} s {ahead} the receiver's UTC (median).")
-        return NmeaClock(np.where(own != NO_TIME, own, stamp_ns), notes)
-    speaks = _of_a_dated_talker(frames, times.dated) & times.timed
+        stamps = spread(_set_right(frames.stamp_ns, times, notes), _sources(frames, said, np.zeros(n, dtype=np.bool_)))
+        right = on_utc(stamps.time_utc_ns, times.full, fixes_of_one(frames, dated, stamps.time_utc_ns - times.full))
+        notes += [*stamps.notes, *right.notes]
+        own = _nearest_day(times, right.time_utc_ns, notes)
+        return NmeaClock(np.where(own != NO_TIME, own, right.time_utc_ns), notes)
+    speaks, differing = speaking(frames, dated, times.of_day)
+    speaks, notes = speaks & times.timed, [*notes, *differing]
     own = _nearest_day(times, _by_counting_days(times, speaks), notes)
     follows = _follows(said)
     if follows:
         notes.append("VTG repeats the fix behind it: sentences without a time are given that of the next fix.")
     fix = (own != NO_TIME) & speaks
-    n = own.size
     carrier = _next(fix) if follows else _latest(fix)
     carried = np.where((carrier >= 0) & (carrier < n), own[np.clip(carrier, 0, max(n - 1, 0))], NO_TIME)
     return NmeaClock(
@@ -131,16 +129,7 @@ def _delays(
     notes: list[str],
 ) -> Nanoseconds:
     """Return what is added to the time of the fix for the sentences that share it with others of their source."""
-    source = np.full(own.size, -1, dtype=np.int64)
-    for name, sentences in said.items():
-        good = (sentences.reason == 0) & (own[sentences.record] == NO_TIME) & (carried[sentences.record] != NO_TIME)
-        # an instrument may send roll and pitch in two sentences of one address: these are one measurement
-        kinds = (
-            [there.astype(np.int64) << k for k, (_, there) in enumerate(sentences.values.values())]
-            if name == "XDR"
-            else []
-        )
-        source[sentences.record] = np.where(good, frames.address[sentences.record] * 4 + sum(kinds), -1)
+    source = _sources(frames, said, (own != NO_TIME) | (carried == NO_TIME))
     record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
     delay, shared = _spread(own[at], at, record, source[record], follows=follows)
     delays = np.zeros(own.size, dtype=np.int64)
@@ -150,6 +139,21 @@ def _delays(
         names = ", ".join(sorted(frames.names[code] for code in several))
         notes.append(f"Sentences that come several times between two fixes were spread evenly over it: {names}.")
     return delays
+
+
+def _sources(frames: Frames, said: dict[str, Said], timed: Flag) -> Index:
+    """Return for each line which instrument says what it says; -1 for one that is refused or has a time already."""
+    source = np.full(timed.size, -1, dtype=np.int64)
+    for name, sentences in said.items():
+        good = (sentences.reason == 0) & ~timed[sentences.record]
+        # an instrument may send roll and pitch in two sentences of one address: these are one measurement
+        kinds = (
+            [there.astype(np.int64) << k for k, (_, there) in enumerate(sentences.values.values())]
+            if name == "XDR"
+            else []
+        )
+        source[sentences.record] = np.where(good, frames.address[sentences.record] * 4 + sum(kinds), -1)
+    return source
 
 
 def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]:
@@ -171,18 +175,6 @@ def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]
     full = np.where(dated, midnight + of_day, NO_TIME)
     full, late = _correct_rollover(full, dated, frames.stamp_ns)
     return _LineTimes(of_day, full, void), late
-
-
-def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
-    """Return which sentences come from a talker that also sends the date.
-
-    A display that repeats a receiver's position without the date repeats it late, too: it gives its own sentences
-    their time, but carries none to others.
-    """
-    talker = ["GN" if name[:2] in SATELLITES else name[:2] for name in frames.names]
-    talkers = {talker[code] for code in np.flatnonzero(np.bincount(frames.address[dated]))}
-    of_name = [prefix in talkers for prefix in talker]
-    return np.array([*of_name, False], dtype=np.bool_)[frames.address]
 
 
 def _by_counting_days(times: _LineTimes, speaks: Flag) -> Nanoseconds:

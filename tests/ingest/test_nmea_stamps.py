@@ -1,0 +1,127 @@
+"""Clocks of an NMEA log: that of a logger that is off, stamps that are coarse, and two receivers that disagree."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from tests.ingest.test_nmea_clock import START, read, rmc, sentence
+
+RATE_HZ = 5
+
+
+def instants(many: int) -> list[datetime]:
+    return [START + timedelta(seconds=k) for k in range(many)]
+
+
+def log(many: int = 120, lead=lambda second: 0.0, stamp=lambda when: f"{when:%Y-%m-%dT%H:%M:%S.%f}Z") -> list[str]:
+    """A fix a second that arrives after 20 ms, and headings five times a second, 30 ms into each fifth."""
+    arrived = [(k + 0.02, rmc(when)) for k, when in enumerate(instants(many))]
+    arrived += [(k + n / RATE_HZ + 0.03, sentence(f"HEHDT,{k}.{n},T")) for k in range(many) for n in range(RATE_HZ)]
+    return [f"{stamp(START + timedelta(seconds=second + lead(second)))} {words}" for second, words in sorted(arrived)]
+
+
+def late(readings) -> np.ndarray:
+    """How long after it was measured each heading is dated, s, in the order of the log."""
+    headings = readings.frame.filter(readings.frame["heading_rad"].is_not_null())
+    value = np.round(np.rad2deg(headings["heading_rad"].to_numpy()), 1)
+    measured = np.floor(value) + (value % 1.0) * 10.0 / RATE_HZ
+    return (headings["time_utc_ns"].to_numpy() - int(START.timestamp()) * 10**9) / 1e9 - measured
+
+
+@pytest.mark.parametrize("lead_s", [3.7, -2.0, 7200.0, -315_360_000.0])
+def test_a_logger_s_clock_that_is_off_is_put_right_by_the_receiver(lead_s: float) -> None:
+    readings = read(*log(lead=lambda _: lead_s))
+    np.testing.assert_allclose(late(readings), 0.01, atol=2e-3)
+    (note,) = readings.notes
+    assert ("ahead of" if lead_s > 0 else "behind") in note and "stamps were put right by it" in note
+    assert readings.tally.records_rejected == 0
+
+
+def test_a_receiver_that_sends_late_is_no_clock_that_is_off() -> None:
+    readings = read(*log(lead=lambda _: 0.4))
+    np.testing.assert_allclose(late(readings), 0.43, atol=2e-3)
+    assert readings.notes == ()
+    # it may be either
+    readings = read(*log(lead=lambda _: 0.8))
+    np.testing.assert_allclose(late(readings), 0.83, atol=2e-3)
+    (note,) = readings.notes
+    assert "0.820 s ahead of" in note and "They were kept" in note
+
+
+def test_a_clock_that_is_set_or_drifts_is_followed() -> None:
+    readings = read(*log(lead=lambda second: 3.0 if second < 60.6 else 0.0))
+    np.testing.assert_allclose(late(readings), 0.01, atol=2e-3)
+    assert "from 0.020 to 3.020 s" in readings.notes[0]
+    readings = read(*log(300, lead=lambda second: 0.01 * second))
+    assert np.abs(late(readings)).max() < 0.2  # the ends of a median of half a minute
+
+
+def test_stamps_of_whole_seconds_are_spread_over_the_second() -> None:
+    readings = read(*log(stamp=lambda when: f"{when:%Y-%m-%dT%H:%M:%S}Z"))
+    assert readings.tally.records_rejected == 0 and "whole seconds" in readings.notes[0]
+    # each in the middle of its fifth of a second
+    np.testing.assert_allclose(late(readings), 0.1, atol=1e-6)
+
+
+def test_what_comes_in_bursts_is_spread_over_the_time_before() -> None:
+    def burst(when: datetime) -> str:
+        second = (when - START).total_seconds()
+        return f"{START + timedelta(seconds=np.ceil(second - 0.5) + 0.5):%Y-%m-%dT%H:%M:%S.%f}Z"
+
+    readings = read(*log(stamp=burst))
+    assert readings.tally.records_rejected == 0 and "every 1 s (median)" in readings.notes[0]
+    # in the first and the last burst there are fewer
+    assert np.abs(late(readings)[RATE_HZ:-RATE_HZ]).max() < 0.2
+
+
+def test_stamps_as_they_should_be_are_left_alone() -> None:
+    readings = read(*log())
+    np.testing.assert_allclose(late(readings), 0.03, atol=1e-6)
+    assert readings.notes == ()
+
+
+def plain(*others: list[str]) -> list[str]:
+    """A log without stamps: a fix a second of GPRMC, five headings behind it, and other sentences between."""
+    lines = []
+    for k, when in enumerate(instants(60)):
+        lines += [rmc(when), *(other[k] for other in others)]
+        lines += [sentence(f"HEHDT,{k}.{n},T") for n in range(RATE_HZ)]
+    return lines
+
+
+def zda(when: datetime, talker: str) -> str:
+    return sentence(f"{talker}ZDA,{when:%H%M%S}.00,{when:%d,%m,%Y},00,00")
+
+
+@pytest.mark.parametrize(
+    ("other", "named"),
+    [
+        (lambda when: zda(when + timedelta(seconds=3), "ZQ"), "ZQZDA is 3.0 s ahead of that of GPRMC"),
+        (lambda when: zda(when + timedelta(hours=2), "GP"), "GPZDA is 7200.0 s ahead of that of GPRMC"),
+        (lambda when: rmc(when - timedelta(seconds=2), talker="GN"), "GNRMC is 2.0 s behind that of GPRMC"),
+        (lambda when: rmc(when - timedelta(seconds=2), talker="GL"), "GLRMC is 2.0 s behind that of GPRMC"),
+    ],
+)
+def test_one_clock_dates_the_sentences_without_a_time(other, named: str) -> None:
+    alone = late(read(*plain()))
+    readings = read(*plain([other(when) for when in instants(60)]))
+    np.testing.assert_allclose(late(readings), alone)
+    assert any(named in note for note in readings.notes)
+
+
+def test_a_clock_that_agrees_is_no_other_clock() -> None:
+    readings = read(*plain([zda(when, "ZQ") for when in instants(60)]))
+    np.testing.assert_allclose(late(readings), late(read(*plain())))
+    assert not any("clock" in note for note in readings.notes)
+
+
+def test_another_receiver_dates_while_the_first_is_silent() -> None:
+    when = instants(60)
+    lines = []
+    for k, at in enumerate(when):
+        lines += [rmc(at)] if k < 30 else []
+        lines += [rmc(at, talker="II"), *(sentence(f"HEHDT,{k}.{n},T") for n in range(RATE_HZ))]
+    np.testing.assert_allclose(late(read(*lines)), 0.0, atol=1e-6)
