@@ -23,6 +23,8 @@ from kempf.schemas.effect import Effect
 _MEMBERS = 4
 #: manoeuvres, fitted and held out, from which predictions choose
 _FEWEST = 3
+#: standard errors from nothing within which an effect may be taken out again
+_SEEN = 2.0
 
 Member = tuple[Candidate, Confirmation, Ahead]
 
@@ -39,7 +41,8 @@ def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
         more = _one_more(ladder, ladder.shooting, steps) or _several_more(ladder, ladder.shooting, steps)
         if not more:
             break
-        steps = more
+        idle = _idle(ladder, more)
+        steps = more if idle is None else ladder.without(idle, more)
         ladder.probe = steps[-1].fit
     return steps
 
@@ -67,9 +70,7 @@ def _one_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> lis
         confirmation = ladder.confirmed(last.fit, alone, candidate)
         if _stands(candidate, confirmation) and not confirmation.absent:
             tried.append((candidate, confirmation, ahead))
-    steps = _put_on(ladder, shooting, steps, tried, choice.stability)
-    idle = _idle(ladder, steps) if steps else None
-    return steps if idle is None else ladder.without(idle, steps)
+    return _put_on(ladder, shooting, steps, tried, choice.stability)
 
 
 def _several_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> list[Step]:
@@ -157,13 +158,23 @@ def _decided(shooting: ShootingRange, tried: Sequence[Member]) -> list[Member]:
 
 
 def _idle(ladder: Ladder, steps: Sequence[Step]) -> Effect | None:
-    """Return an effect added before the last one without which legs are predicted as well, None where there is none."""
+    """Return an effect added before the last one that is not needed any more, None where there is none.
+
+    Without it legs are predicted as well; or so much worse as chance may have it, and its size is nothing within two
+    standard errors: what was added later has taken over what it was chosen for.
+    """
     now = steps[-1].ahead
     assert ladder.shooting is not None
     assert now is not None
     for step in steps[1:-1]:
         assert step.added is not None
         comparison = paired(ladder.shooting.without(now, step.added).left_out, now.left_out)
-        if comparison.in_std < ALIKE and comparison.falls_by < LEAST_FALL:
+        if comparison.in_std < ALIKE and (comparison.falls_by < LEAST_FALL or not _is_sized(now, step.added)):
             return step.added
     return None
+
+
+def _is_sized(ahead: Ahead, effect: Effect) -> bool:
+    """Return whether a parameter of an effect is more than two standard errors from nothing."""
+    own = ahead.model.own(effect.name)
+    return bool(np.any(np.abs(ahead.fit.values[own]) > _SEEN * ahead.std[-ahead.fit.values.size :][own]))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED, changes
+from kempf.pipeline.diagnose.immaterial import LEAST_PART, LEAST_SHIFT, weighed
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
@@ -18,6 +20,8 @@ from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.median_error import median_error
 from kempf.schemas.enumeration import listed
 
+#: share of the misfit below which nothing of it is explained
+_LEAST_SHARE = 0.005
 #: so many free runs that leave the course are named
 _NAMED = 3
 #: of what is left where nothing is seen in it
@@ -40,6 +44,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
         lines.append(line.rstrip(".") + ".")
+    lines += _moving_the_hull(diagnosis)
     lines += _together(diagnosis)
     if len(diagnosis.steps) > 1:
         lines += _ahead(diagnosis)
@@ -99,6 +104,22 @@ def _given(diagnosis: Diagnosis) -> list[str]:
     ]
 
 
+def _moving_the_hull(diagnosis: Diagnosis) -> list[str]:
+    """Say of effects that hardly change a prediction why they matter all the same."""
+    lines = []
+    for before, step in pairwise(diagnosis.steps):
+        if step.added is None or step.stability is not None:
+            continue
+        weight = weighed(before.ahead, step.ahead, before.fit, step.fit)
+        if weight.fall <= LEAST_PART and weight.shift > LEAST_SHIFT:
+            title = f"{step.added.title[:1].upper()}{step.added.title[1:]}"
+            lines.append(
+                f"{title} hardly changes a prediction one leg ahead ({-100.0 * weight.fall:+.1f} % of the misfit), but "
+                f"without it a parameter of the hull is off by {100.0 * weight.shift:.0f} %."
+            )
+    return lines
+
+
 def _left(diagnosis: Diagnosis) -> list[str]:
     """Say how much of what the last model leaves is noise, and where it sits."""
     if diagnosis.remaining is None:
@@ -142,9 +163,9 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     if share is not None:
         seen = diagnosis.something_left or last.disagrees is not None or diagnosis.immaterial or diagnosis.suspected
         rest = "" if seen else _REST
+        explained = f"{100.0 * share:.0f} %" if share >= _LEAST_SHARE else "nothing"
         lines.append(
-            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained"
-            f"{rest}."
+            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {explained} is explained{rest}."
         )
     lines += _left(diagnosis)
     if last.disagrees is not None:

@@ -8,13 +8,17 @@ from typing import cast
 import numpy as np
 import pytest
 
+from kempf.pipeline.diagnose.by_prediction import _idle
 from kempf.pipeline.diagnose.immaterial import Weight
+from kempf.pipeline.diagnose.ladder import Ladder
+from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.legs import in_std
 from kempf.pipeline.diagnose.matters import better_ahead, falls, worsens
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.pipeline.shooting.left_out import LeftOut
 from kempf.schemas.effect import Effect
-from kempf.schemas.effects import catalogue
+from kempf.schemas.effects import catalogue, get
 
 
 def ahead(level: float, spread: float = 0.1, seed: int = 1, *, held: float | None = None) -> Ahead:
@@ -89,3 +93,29 @@ def test_the_likeliest_effect_worth_it_is_refitted_wherever_the_screen_by_legs_r
     first_six = [effect.name for effect in effects[:6]]
     # where the likeliest is worth nothing ahead, the likeliest of the others is the first of them
     assert refits == [*first_six, effects[best_by_likelihood].name] if refitted_too else refits == first_six
+
+
+@pytest.mark.parametrize(
+    ("without", "size", "idle"),
+    [
+        # legs are predicted as well without it
+        ((1.0, 0.1), 9.0, True),
+        # by a tenth worse, as chance may have it: it depends on whether there is anything of it
+        ((1.1, 1.5), 0.7, True),
+        ((1.1, 1.5), 9.0, False),
+        # clearly worse: it is needed whatever its size
+        ((2.0, 0.1), 0.7, False),
+    ],
+)
+def test_an_effect_whose_part_another_has_taken_over_is_taken_out(
+    without: tuple[float, float], size: float, idle: bool
+) -> None:
+    first, last = get("cross_flow_drag"), get("cross_flow_cubic")
+    now = ahead(1.0, without[1])
+    vars(now)["fit"] = SimpleNamespace(values=np.array([size, 5.0]))
+    vars(now)["std"] = np.ones(8)
+    vars(now)["model"] = EffectModel((first, last))
+    steps = [SimpleNamespace(added=added, ahead=now) for added in (None, first, last)]
+    shooting = SimpleNamespace(without=lambda *_: ahead(without[0], without[1], seed=2))
+    found = _idle(cast("Ladder", SimpleNamespace(shooting=shooting)), cast("list[Step]", steps))
+    assert found is (first if idle else None)
