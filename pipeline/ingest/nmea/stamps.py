@@ -15,6 +15,9 @@ _LEAST = 20
 #: Share of the stamps that are whole seconds where all are meant to be, and of those that several sentences of a
 #: source share where it is no accident.
 _WHOLE, _SHARED = 0.99, 0.1
+#: Share of the lines that have the stamp of the line before where they come in bursts; several instruments may well speak
+#: in one millisecond.
+_BESIDE_EACH_OTHER = 0.5
 #: A stamp waits for so many usual distances of the stamps at most: a longer one is a pause of the log.
 _PAUSE = 3
 #: Receivers send a fix up to a second after its instant, and never before; what rounding leaves before it, ns.
@@ -35,6 +38,26 @@ class Stamps:
     notes: tuple[str, ...] = ()
 
 
+def are_coarse(stamp_ns: Nanoseconds) -> bool:
+    """Return whether stamps may be whole seconds or shared by lines that did not come at one instant.
+
+    Parameters
+    ----------
+    stamp_ns : ndarray of int64, shape (n,)
+        `NO_TIME` where a line has none.
+    """
+    known = stamp_ns[stamp_ns != NO_TIME]
+    if known.size < _LEAST:
+        return False
+    return bool(np.mean(known[1:] == known[:-1]) >= _BESIDE_EACH_OTHER) or _whole(known)
+
+
+def _whole(stamp_ns: Nanoseconds) -> bool:
+    # most logs are answered by their first lines
+    few = stamp_ns[:_LEAST]
+    return bool(np.mean(few % SECOND_NS == 0) >= 0.5 and np.mean(stamp_ns % SECOND_NS == 0) >= _WHOLE)
+
+
 def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
     """Spread the sentences that share a stamp over the time that it stands for.
 
@@ -52,7 +75,7 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
     if record.size == 0:
         return Stamps(stamp_ns)
     stamp, own = stamp_ns[record], source[record]
-    whole = record.size >= _LEAST and bool(np.mean(stamp % SECOND_NS == 0) >= _WHOLE)
+    whole = _whole(stamp)
     order = np.lexsort((record, stamp, own))
     opens = np.concatenate(([True], (np.diff(own[order]) != 0) | (np.diff(stamp[order]) != 0)))
     heads = np.flatnonzero(opens)
