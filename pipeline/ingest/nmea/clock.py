@@ -9,8 +9,8 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds, Reason
 from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.nmea.logger_clock import LoggerTimes, are_coarse, on_utc, spread
 from kempf.pipeline.ingest.nmea.receiver import fixes_of_one, speaking
-from kempf.pipeline.ingest.nmea.stamps import Stamps, are_coarse, on_utc, spread
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
@@ -82,7 +82,7 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     fixed = times.dated & ~times.void
     dated = fixed if fixed.any() else times.dated
     if frames.stamped:
-        stamps = Stamps(_set_right(frames.stamp_ns, times, notes))
+        stamps = LoggerTimes(_set_right(frames.stamp_ns, times, notes))
         if are_coarse(stamps.time_utc_ns):
             stamps = spread(stamps.time_utc_ns, _sources(frames, said, np.zeros(n, dtype=np.bool_)))
         right = on_utc(stamps.time_utc_ns, times.full, fixes_of_one(frames, dated, stamps.time_utc_ns - times.full))

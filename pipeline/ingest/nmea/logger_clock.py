@@ -10,7 +10,7 @@ from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
-#: Stamps of one source, by which it is judged whether several of its sentences share one.
+#: LoggerTimes of one source, by which it is judged whether several of its sentences share one.
 _LEAST = 20
 #: Share of the stamps that are whole seconds where all are meant to be, and of those that several sentences of a
 #: source share where it is no accident.
@@ -29,7 +29,7 @@ _BESIDE, _MANY = 15, 100_000
 
 
 @dataclass(frozen=True, eq=False)
-class Stamps:
+class LoggerTimes:
     """Times of arrival by the logger."""
 
     #: Shape (n,). `NO_TIME` where a line has none.
@@ -58,7 +58,7 @@ def _whole(stamp_ns: Nanoseconds) -> bool:
     return bool(np.mean(few % SECOND_NS == 0) >= 0.5 and np.mean(stamp_ns % SECOND_NS == 0) >= _WHOLE)
 
 
-def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
+def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
     """Spread the sentences that share a stamp over the time that it stands for.
 
     A stamp of whole seconds stands for the second that begins with it. One that several sentences of an instrument
@@ -73,7 +73,7 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
     """
     (record,) = np.nonzero((stamp_ns != NO_TIME) & (source >= 0))
     if record.size == 0:
-        return Stamps(stamp_ns)
+        return LoggerTimes(stamp_ns)
     stamp, own = stamp_ns[record], source[record]
     whole = _whole(stamp)
     order = np.lexsort((record, stamp, own))
@@ -81,7 +81,7 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
     heads = np.flatnonzero(opens)
     count = np.diff(heads, append=record.size)
     if not whole and not _in_bursts(own[order][heads], count):
-        return Stamps(stamp_ns)
+        return LoggerTimes(stamp_ns)
     shared, place = np.repeat(count, count), np.arange(record.size) - np.repeat(heads, count)
     instants = np.unique(stamp)
     if whole:
@@ -101,7 +101,7 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Stamps:
     result = stamp_ns.copy()
     # the middle of its share of the time: half a step later than it may have come, and half a step earlier
     result[record[order]] = begins + (2 * place + 1) * lasting // (2 * shared)
-    return Stamps(result, (note,))
+    return LoggerTimes(result, (note,))
 
 
 def _in_bursts(source: Index, count: Index) -> bool:
@@ -113,7 +113,7 @@ def _in_bursts(source: Index, count: Index) -> bool:
     return False
 
 
-def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> Stamps:
+def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:
     """Put stamps of a clock that is off on the receiver's UTC.
 
     How far the stamps of the fixes are ahead of the instants that the fixes give is the clock's error and the time that
@@ -123,13 +123,13 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> Stamps:
     Parameters
     ----------
     stamp_ns, full_ns : ndarray of int64, shape (n,)
-        Stamps and what sentences say of date and time; `NO_TIME` where there is none.
+        LoggerTimes and what sentences say of date and time; `NO_TIME` where there is none.
     fix : ndarray of bool, shape (n,)
         Sentences that are believed.
     """
     (at,) = np.nonzero(fix & (stamp_ns != NO_TIME) & (full_ns != NO_TIME))
     if at.size == 0:
-        return Stamps(stamp_ns)
+        return LoggerTimes(stamp_ns)
     own = full_ns[at]
     lead = _running_median(stamp_ns[at] - own)
     usual = int(np.sort(lead)[lead.size // 2])
@@ -138,7 +138,7 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> Stamps:
     size = f"{much} {ahead} the receiver's UTC (median)"
     if lead.min() >= _EARLIEST_NS and lead.max() <= _LATEST_NS:
         late = f"The logger's stamps are {size}: its clock may be off, or the receiver sends so late. They were kept."
-        return Stamps(stamp_ns, (late,) if usual > _WORTH_NS else ())
+        return LoggerTimes(stamp_ns, (late,) if usual > _WORTH_NS else ())
     (record,) = np.nonzero(stamp_ns != NO_TIME)
     before = np.clip(np.searchsorted(at, record, side="right") - 1, 0, at.size - 1)
     after = np.clip(np.searchsorted(at, record), 0, at.size - 1)
@@ -151,7 +151,7 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> Stamps:
     result[record] = np.where(off[0] <= off[1], by_before, by_after)
     moved = int(lead.max() - lead.min())
     between = f", from {lead.min() / SECOND_NS:.3f} to {lead.max() / SECOND_NS:.3f} s" if moved > _WORTH_NS else ""
-    return Stamps(result, (f"The logger's clock is {size}{between}: {record.size} stamps were put right by it.",))
+    return LoggerTimes(result, (f"The logger's clock is {size}{between}: {record.size} stamps were put right by it.",))
 
 
 def _running_median(value: Nanoseconds) -> Nanoseconds:
