@@ -1,0 +1,142 @@
+"""How delimited text is laid out: the sign between its cells, the names of its columns, its rows."""
+
+from __future__ import annotations
+
+import codecs
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.ingest.sniff import separator_of
+from kempf.pipeline.ingest.spans import Spans, as_bytes, lines_of, trimmed
+from kempf.schemas.errors import UsageError
+from kempf.schemas.profile import Source
+
+#: Longest row that is cut into cells, bytes.
+LONGEST_ROW = 1 << 20
+
+#: Rows, spread over the file, by which it is seen how its rows end.
+_LOOKED_AT = 40
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """How the lines of a file are laid out."""
+
+    #: Every line of data that is not blank, shape (n,).
+    rows: Spans
+    #: Names of the columns; empty for one that has none.
+    columns: tuple[str, ...]
+    #: One character, ``whitespace``, or None for a single column.
+    separator: str | None
+
+
+def layout_of(data: bytes, source: Source) -> Layout:
+    """Return how a file is laid out.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file, decompressed.
+    source : Source
+        What it leaves open is taken from the first line.
+
+    Raises
+    ------
+    UsageError
+        ``unknown_encoding``.
+    """
+    lines = trimmed(lines_of(as_bytes(as_utf8(data, source.encoding))))
+    behind_header = np.arange(len(lines)) >= source.header_lines
+    lines = lines.take(behind_header & (lines.stop > lines.start))
+    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 30).to_list()
+    separator = source.separator or separator_of(first[0] if first else "")
+    if source.columns is not None:
+        names, rows = source.columns, _untrimmed(lines, separator)
+    else:
+        names = [cell.strip('"').strip() for cell in cells_of(first[0], separator)] if first else []
+        rows = _untrimmed(lines.take(np.arange(1, len(lines))), separator)
+    if separator is not None and separator != "whitespace" and len(rows):
+        spread = np.unique(np.linspace(0, len(rows) - 1, _LOOKED_AT).astype(np.int64))
+        shown = rows.take(spread).text(limit=LONGEST_ROW).to_list()
+        names = fitted(names, [cells_of(row, separator) for row in shown])
+    return Layout(rows, tuple(names), separator)
+
+
+def cells_of(line: str, separator: str | None) -> list[str]:
+    """Return the cells of one line, without the blanks around them.
+
+    Parameters
+    ----------
+    separator : str or None
+        One character, ``whitespace``, or None for a line that is one cell.
+
+    Examples
+    --------
+    >>> cells_of("time, speed ,", ",")
+    ['time', 'speed', '']
+    """
+    if separator is None:
+        return [line.strip()]
+    parts = line.split() if separator == "whitespace" else line.split(separator)
+    return [part.strip() for part in parts]
+
+
+def fitted(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return the names of the columns with as many at their end as the rows have cells.
+
+    Many loggers write a separator behind the last cell too, be it in the rows or in the header: a cell that is empty,
+    or a column without a name.
+
+    Parameters
+    ----------
+    names : sequence of str
+        As the header has them.
+    rows : sequence of sequence of str
+        The cells of some rows.
+
+    Examples
+    --------
+    >>> fitted(["t", "heading"], [["1", "90", ""], ["2", "91", ""]])
+    ['t', 'heading', '']
+    """
+    names = list(names)
+    behind = sum(len(cells) == len(names) + 1 and not cells[-1] for cells in rows)
+    short = sum(len(cells) == len(names) - 1 for cells in rows)
+    if 2 * behind > len(rows):
+        return [*names, ""]
+    if 2 * short > len(rows) and not names[-1]:
+        return names[:-1]
+    return names
+
+
+def as_utf8(data: bytes, encoding: str) -> bytes:
+    """Return text in UTF-8 without a byte-order mark; what the encoding does not have becomes U+FFFD.
+
+    Raises
+    ------
+    UsageError
+        ``unknown_encoding``: Python does not know it.
+    """
+    try:
+        codec = codecs.lookup(encoding).name
+        if codec != "utf-8":
+            data = data.decode(encoding, errors="replace").encode("utf-8")
+    except (LookupError, TypeError, ValueError) as error:
+        raise UsageError(
+            "unknown_encoding",
+            f"The profile's encoding {encoding!r} cannot be used: {error}.",
+            "Write one that Python knows, such as utf-8, cp1252 or utf-16.",
+            {"encoding": encoding},
+        ) from error
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
+def _untrimmed(lines: Spans, separator: str | None) -> Spans:
+    """Give back the tabs at the end of the lines where the tab is the separator: they stand for empty cells."""
+    if separator != "\t" or len(lines) == 0:
+        return lines
+    full = lines_of(lines.buffer)
+    at = np.searchsorted(full.start, lines.start, side="right") - 1
+    return full.take(at)
