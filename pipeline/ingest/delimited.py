@@ -140,18 +140,19 @@ def titled(data: bytes) -> Titled | None:
     below = [cells_of(line, first) for line in later]
     if first and median(map(len, below)) == len(fitted(cells_of(lines[0][1], first), below)):
         return None
-    for separator in (",", ";", "\t", None):
-        counts = {len(line.split(separator)) for line in later}
-        if len(counts) == 1 and (cells := counts.pop()) > 1:
+    for separator in (",", ";", "\t", "whitespace"):
+        counts = {len(cells_of(line, separator)) for line in later}
+        if len(counts) == 1 and (count := counts.pop()) > 1:
             break
     else:
         return None
     begin = len(lines) - 1  # the last one may be cut
-    while begin and len(lines[begin - 1][1].split(separator)) == cells:
+    while begin and len(cells_of(lines[begin - 1][1], separator)) == count:
         begin -= 1
     place, head = lines[begin]
-    names = [] if any(map(_is_number, head.split(separator))) else [n.strip(' "') for n in head.split(separator)]
-    return Titled(place, separator or "whitespace", tuple(names), cells) if begin or separator is None else None
+    cells = cells_of(head, separator)
+    names = () if any(map(_is_number, cells)) else tuple(cells)
+    return Titled(place, separator, names, count) if begin or separator == "whitespace" else None
 
 
 def _is_number(cell: str) -> bool:

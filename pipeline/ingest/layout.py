@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -55,7 +56,7 @@ def layout_of(data: bytes, source: Source) -> Layout:
     if source.columns is not None:
         names, rows = source.columns, _untrimmed(lines, separator)
     else:
-        names = [cell.strip('"').strip() for cell in cells_of(first[0], separator)] if first else []
+        names = cells_of(first[0], separator) if first else []
         rows = _untrimmed(lines.take(np.arange(1, len(lines))), separator)
     if separator is not None and separator != "whitespace" and len(rows):
         spread = np.unique(np.linspace(0, len(rows) - 1, _LOOKED_AT).astype(np.int64))
@@ -65,7 +66,7 @@ def layout_of(data: bytes, source: Source) -> Layout:
 
 
 def cells_of(line: str, separator: str | None) -> list[str]:
-    """Return the cells of one line, without the blanks around them.
+    """Return the cells of one line, without the blanks and the quotation marks around them.
 
     Parameters
     ----------
@@ -74,13 +75,20 @@ def cells_of(line: str, separator: str | None) -> list[str]:
 
     Examples
     --------
-    >>> cells_of("time, speed ,", ",")
-    ['time', 'speed', '']
+    >>> cells_of('time, "depth, below keel" ,', ",")
+    ['time', 'depth, below keel', '']
     """
-    if separator is None:
-        return [line.strip()]
-    parts = line.split() if separator == "whitespace" else line.split(separator)
-    return [part.strip() for part in parts]
+    marks = line.count('"')
+    # a mark that is never closed is one of damage
+    if separator is not None and separator != "whitespace" and marks and marks % 2 == 0:
+        try:
+            # a blank that is skipped must not be the separator
+            (parts,) = csv.reader([line], delimiter=separator, skipinitialspace=separator != " ")
+            return [part.strip() for part in parts]
+        except csv.Error:
+            pass  # longer than any cell it takes, or with a line end within
+    parts = [line] if separator is None else line.split() if separator == "whitespace" else line.split(separator)
+    return [part.strip().strip('"').strip() for part in parts]
 
 
 def fitted(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

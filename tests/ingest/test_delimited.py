@@ -335,3 +335,26 @@ def test_an_hour_of_one_digit_beside_hours_of_two_costs_no_row():
     assert (readings.frame["time_utc_ns"][1] - readings.frame["time_utc_ns"][0]) == 10**9
     assert readings.rejected["record"].to_list() == [2, 3]
     assert readings.notes == ("Times without a zone are taken as UTC.",)
+
+
+@pytest.mark.parametrize(
+    ("header", "sign"),
+    [
+        ('utc,"depth, below keel",sog,hdg', ","),
+        ('"utc", "depth, below ""the"" keel" , "sog","hdg"', ","),
+        ('utc;"depth, below, the, keel";sog;hdg', ";"),
+        ("utc,depth 5' below,sog,hdg", ","),
+        ('utc,"depth,sog,hdg', ","),
+    ],
+)
+def test_the_header_may_have_separators_between_quotation_marks(header, sign):
+    rows = f"{T}1Z,7,10,90\n{T}2Z,8,11,91\n".replace(",", sign)
+    readings = read(f"{header}\n{rows}")
+    assert readings.frame["heading_rad"].to_list() == [math.radians(90), math.radians(91)]
+
+
+@pytest.mark.parametrize("header", ['t,"depth, below keel",hdg', "t,depth,hdg", "t,depth,hdg,"])
+@pytest.mark.parametrize("more", ["", ","])
+def test_a_header_with_quoted_names_or_a_separator_at_its_end_is_no_title(header, more):
+    text = f"{header}\n" + f"1.5,2,3{more}\n" * 9
+    assert delimited.titled(text.encode()) is None
