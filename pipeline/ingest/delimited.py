@@ -9,7 +9,8 @@ import numpy as np
 import polars as pl
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Reason, Values
-from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, as_utf8, cells_of, fitted, layout_of
+from kempf.pipeline.ingest.encoding import advice_on, as_utf8
+from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, cells_of, fitted, layout_of
 from kempf.pipeline.ingest.mapping import check_once
 from kempf.pipeline.ingest.misfit import cells_amiss, times_amiss
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
@@ -172,7 +173,8 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
             f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
             f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
-            "Correct the names in the profile's source, or its separator, header_lines or columns.",
+            advice_on(columns)
+            + "Correct the names in the profile's source, or its separator, header_lines or columns.",
             {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
     twice = sorted({column for column in wanted if columns.count(column) > 1})

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import codecs
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.ingest.encoding import as_utf8
 from kempf.pipeline.ingest.sniff import separator_of
 from kempf.pipeline.ingest.spans import Spans, as_bytes, lines_of, trimmed
-from kempf.schemas.errors import UsageError
 from kempf.schemas.profile import Source
 
 #: Longest row that is cut into cells, bytes.
@@ -117,28 +116,6 @@ def fitted(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     if 2 * short > len(rows) and not names[-1]:
         return names[:-1]
     return names
-
-
-def as_utf8(data: bytes, encoding: str) -> bytes:
-    """Return text in UTF-8 without a byte-order mark; what the encoding does not have becomes U+FFFD.
-
-    Raises
-    ------
-    UsageError
-        ``unknown_encoding``: Python does not know it.
-    """
-    try:
-        codec = codecs.lookup(encoding).name
-        if codec != "utf-8":
-            data = data.decode(encoding, errors="replace").encode("utf-8")
-    except (LookupError, TypeError, ValueError) as error:
-        raise UsageError(
-            "unknown_encoding",
-            f"The profile's encoding {encoding!r} cannot be used: {error}.",
-            "Write one that Python knows, such as utf-8, cp1252 or utf-16.",
-            {"encoding": encoding},
-        ) from error
-    return data.removeprefix(codecs.BOM_UTF8)
 
 
 def _untrimmed(lines: Spans, separator: str | None) -> Spans:

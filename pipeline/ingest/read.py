@@ -10,6 +10,7 @@ import polars as pl
 from kempf.pipeline.ingest import sniff
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
 from kempf.pipeline.ingest.decoded import Decoded, Misfit
+from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
@@ -71,12 +72,17 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         raise DataRejected("empty_log", f"{name} is empty.", "Copy the file again from the logger.", {"name": name})
     notes: list[str] = []
     packed = False
+    source = profile.source_for(name)
     if file.read(0, len(sniff.MCAP_MAGIC)) != sniff.MCAP_MAGIC:
         data = _whole(name, file)
         content, notes = unpack(name, data)
         packed = content is not data
+        wide = utf16_of(content[: sniff.SAMPLE])
+        if wide is not None:
+            content = as_utf8(content, wide)
+            notes = [*notes, "The file is encoded as UTF-16, and was read so."]
+            source = source and source.model_copy(update={"encoding": "utf-8"})
         file = LogFile(content)
-    source = profile.source_for(name)
     log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
     kind = sniff.no_log(file.read(0, sniff.SAMPLE))
     if kind is not None:
@@ -183,6 +189,7 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
             f"the columns found in it are {', '.join(repr(c) for c in columns) or 'none'}.",
+            f"{advice_on(columns)}"
             f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. "
             + _SEE_PROFILE,
             {"name": name, "columns": columns, "patterns": [s.match for s in profile.sources]},

@@ -37,7 +37,7 @@ def sniff(data: bytes) -> Format | None:
     Parameters
     ----------
     data : bytes
-        Unpacked content, or its first `SAMPLE` bytes.
+        Unpacked content, or its first `SAMPLE` bytes; text not in UTF-16.
     """
     if data.startswith(MCAP_MAGIC):
         return "mcap"
@@ -46,8 +46,7 @@ def sniff(data: bytes) -> Format | None:
         return "nmea"
     sample = data[:SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
     odd = sum(byte < 9 or 13 < byte < 32 or byte == 127 for byte in sample)
-    wide = sample.startswith((b"\xff\xfe", b"\xfe\xff"))
-    if lines and (wide or odd <= len(sample) // 1000):
+    if lines and odd <= len(sample) // 1000:
         return "delimited"
     return None
 
