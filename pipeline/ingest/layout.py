@@ -55,7 +55,7 @@ def layout_of(data: bytes, source: Source) -> Layout:
     if source.columns is not None:
         names, rows = source.columns, _untrimmed(lines, separator)
     else:
-        names = cells_of(first[0], separator) if first else []
+        names = cells_of(first[0].strip("\0"), separator) if first else []
         rows = _untrimmed(lines.take(np.arange(1, len(lines))), separator)
     if separator is not None and separator != "whitespace" and len(rows):
         spread = np.unique(np.linspace(0, len(rows) - 1, _LOOKED_AT).astype(np.int64))

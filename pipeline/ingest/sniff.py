@@ -20,6 +20,12 @@ _NO_LOGS = (
     (b"{\\rtf", "an RTF document"),
 )
 
+#: Where a tar archive says that it is one.
+_TAR, _TAR_AT = b"ustar", 257
+
+#: NUL bytes in a row that a logger left behind that lost its power; fewer are binary data.
+_LEFT_BEHIND = re.compile(rb"\0{16,}")
+
 #: Bytes of the file that are looked at.
 SAMPLE = 1 << 16
 
@@ -44,9 +50,9 @@ def sniff(data: bytes) -> Format | None:
     lines = [line for line in re.split(rb"[\r\n]", data[:SAMPLE]) if line.strip()]
     if lines and sum(bool(_SENTENCE.match(line.lstrip(b"\0"))) for line in lines) >= _SHARE * len(lines):
         return "nmea"
-    sample = data[:SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
+    sample = _LEFT_BEHIND.sub(b"", data[:SAMPLE].replace(b"\xef\xbb\xbf", b"", 1))
     odd = sum(byte < 9 or 13 < byte < 32 or byte == 127 for byte in sample)
-    if lines and odd <= len(sample) // 1000:
+    if sample.strip() and odd <= len(sample) // 1000:
         return "delimited"
     return None
 
@@ -59,6 +65,8 @@ def no_log(data: bytes) -> str | None:
     >>> no_log(b"%PDF-1.7 trial report")
     'a PDF document'
     """
+    if data.startswith(_TAR, _TAR_AT):
+        return "a tar archive"
     return next((words for begin, words in _NO_LOGS if data.startswith(begin)), None)
 
 

@@ -1,6 +1,8 @@
 """Delimited text: separators, headers, encodings, times, cells."""
 
+import io
 import math
+import tarfile
 from datetime import UTC, datetime
 from time import process_time
 
@@ -358,3 +360,29 @@ def test_the_header_may_have_separators_between_quotation_marks(header, sign):
 def test_a_header_with_quoted_names_or_a_separator_at_its_end_is_no_title(header, more):
     text = f"{header}\n" + f"1.5,2,3{more}\n" * 9
     assert delimited.titled(text.encode()) is None
+
+
+@pytest.mark.parametrize("place", [0, 1, 5, 199])
+@pytest.mark.parametrize("length", [16, 4096, 60_000])
+def test_a_block_of_nul_bytes_costs_one_row_wherever_it_stands(place, length):
+    lines = ["utc,sog,hdg", *(f"2025-05-03T07:{k // 60:02d}:{k % 60:02d}Z,1,{k}" for k in range(200))]
+    lines[place] = "\0" * length + lines[place]
+    readings = read("\n".join(lines))
+    assert readings.rejected["record"].to_list() == ([place - 1] if place else [])
+    assert readings.tally.records_read == 200
+
+
+@pytest.mark.parametrize("data", [bytes(100), b"\0\n" * 99, bytes(50_000) + b"\x01\x02,\x03\n" * 9, b"a,b\0\n" * 99])
+def test_other_bytes_with_nul_among_them_are_no_text(data):
+    with pytest.raises(DataRejected) as error:
+        read_log("log.csv", data, profile())
+    assert error.value.code == "unknown_format"
+
+
+def test_an_archive_is_named_as_one():
+    stream = io.BytesIO()
+    with tarfile.open(fileobj=stream, mode="w") as archive:
+        archive.addfile(tarfile.TarInfo("log.csv"), io.BytesIO())
+    with pytest.raises(DataRejected, match="is a tar archive") as error:
+        read_log("log.tar", stream.getvalue(), profile())
+    assert error.value.code == "unknown_format"
