@@ -6,9 +6,10 @@ from pathlib import Path
 
 from kempf.flows.jobs.files import opened_log
 from kempf.pipeline.ingest import delimited, draft_profile
+from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.fields import fields_of
-from kempf.pipeline.ingest.sniff import MCAP_MAGIC, is_json, sniff
+from kempf.pipeline.ingest.sniff import MCAP_MAGIC, SAMPLE, is_json, sniff
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError
 
@@ -29,6 +30,8 @@ def draft(path: Path) -> str:
         data, _ = unpack(path.name, log.whole())
     if not data:
         raise DataRejected("empty_log", f"{path.name} is empty.", "Copy the file again from the logger.")
+    wide = utf16_of(data[:SAMPLE])
+    data = as_utf8(data, wide) if wide else data
     log_format = sniff(data)
     if log_format == "mcap":
         return _of_topics(path, LogFile(data))
@@ -39,7 +42,11 @@ def draft(path: Path) -> str:
         description = "of no known format" if log_format is None else "text without columns"
         next_step = "Export the log as delimited text with a line of column names, or as NMEA 0183 or MCAP."
         raise _no_draft(path, "JSON text" if is_json(data) else description, next_step, log_format)
-    return draft_profile.draft_profile(path.name, columns, delimited.titled(data))
+    encoding = "latin-1" if advice_on(columns) else None
+    if encoding:
+        data = as_utf8(data, encoding)
+        columns = delimited.columns_found(data, None, most=None)
+    return draft_profile.draft_profile(path.name, columns, delimited.titled(data), encoding)
 
 
 def _of_topics(path: Path, log: LogFile) -> str:

@@ -43,6 +43,18 @@ CODE: dict[Reason, int] = {reason: i + 1 for i, reason in enumerate(REASONS)}
 
 
 @dataclass(frozen=True)
+class Misfit:
+    """What of most records, or of many that follow each other, is not as the profile or the header says."""
+
+    #: A sentence that quotes it, with what was expected.
+    found: str
+    #: What to do.
+    next_step: str
+    #: Number of records.
+    records: int
+
+
+@dataclass(frozen=True)
 class LostStretch:
     """A stretch of a damaged log that could not be read."""
 
@@ -148,6 +160,8 @@ class Decoded:
     notes: list[str] = field(default_factory=list)
     #: What of the log could not be read; of the last part.
     lost: tuple[LostStretch, ...] = ()
+    #: Why records are malformed, where they are many, the most frequent cause first; of the last part.
+    misfits: tuple[Misfit, ...] = ()
     #: Whether no record of the log comes behind these.
     ends: bool = True
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 from dataclasses import dataclass
 from statistics import median
 
@@ -10,9 +9,12 @@ import numpy as np
 import polars as pl
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Reason, Values
+from kempf.pipeline.ingest.encoding import advice_on, as_utf8
+from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, cells_of, fitted, layout_of
 from kempf.pipeline.ingest.mapping import check_once
+from kempf.pipeline.ingest.misfit import cells_amiss, times_amiss
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
-from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, trimmed
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank
 from kempf.pipeline.ingest.text.cells import number
 from kempf.pipeline.ingest.text.row_times import row_times
 from kempf.schemas.errors import DataRejected, UsageError
@@ -25,23 +27,11 @@ _COMMA, _LOOKED_AT_CELLS = r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", 2000
 #: Most characters of a cell that are looked at: far more than any number or time has.
 _LONGEST_CELL = 1_000
 
-#: Longest row that is cut into cells, bytes, and about so many bytes of rows that are cut at a time.
-_LONGEST_ROW, _BLOCK = 1 << 20, 4 << 20
+#: About so many bytes of rows are cut at a time.
+_BLOCK = 4 << 20
 
 #: Most names of columns that a message lists.
 _SHOWN = 40
-
-
-@dataclass(frozen=True, eq=False)
-class Layout:
-    """How the lines of a file are laid out."""
-
-    #: Every line of data that is not blank, shape (n,).
-    rows: Spans
-    #: Names of the columns.
-    columns: tuple[str, ...]
-    #: One character, ``whitespace``, or None for a single column.
-    separator: str | None
 
 
 @dataclass(frozen=True)
@@ -85,11 +75,12 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     """
     if source.time is None or not (source.time.columns or source.time.interval_s):
         raise UsageError("no_time_column", f"The source for {name} names no time column.", "Add 'time' to the source.")
-    layout = _layout(data, source)
+    layout = layout_of(data, source)
     wanted = list(dict.fromkeys([*source.time.columns, *source.channels]))
     _check_columns(name, layout, wanted)
     check_once(name, source.channels)
-    whole, cells = _cells(layout, wanted)
+    count, cells = _cells(layout, wanted)
+    whole = count == len(layout.columns)
     cells = _with_points(name, cells, source)
     n = len(layout.rows)
     reason = np.zeros(n, dtype=np.int8)
@@ -98,7 +89,12 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     timed = row_times(name, cells, record, layout.rows.take(record), source.time)
     time = np.full(n, NO_TIME, dtype=np.int64)
     time[record[timed.good]] = timed.time_utc_ns[timed.good]
-    reason[record[~timed.good & timed.stated]] = CODE[Reason.MALFORMED]
+    unread = record[~timed.good & timed.stated]
+    reason[unread] = CODE[Reason.MALFORMED]
+    misfits = (
+        cells_amiss(layout, count, named=source.columns is not None),
+        times_amiss(layout.rows, {key: cells[key] for key in source.time.columns}, record, unread, source.time),
+    )
     channels: dict[str, Values] = {}
     for column, mapped in source.channels.items():
         value = cells[column]
@@ -106,13 +102,25 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         values = channels.setdefault(mapped.channel, Values.empty(n))
         values.put(record[there], (number(value) * mapped.factor + mapped.offset_si)[there])
     rows, sources = np.arange(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    return Decoded(rows, layout.rows, layout.rows, time, sources, ("row",), reason, channels, timed.notes)
+    return Decoded(
+        rows,
+        layout.rows,
+        layout.rows,
+        time,
+        sources,
+        ("row",),
+        reason,
+        channels,
+        timed.notes,
+        misfits=tuple(sorted(filter(None, misfits), key=lambda misfit: -misfit.records)),
+    )
 
 
 def columns_found(data: bytes, source: Source | None, most: int | None = _SHOWN) -> list[str]:
     """Return the first names of columns that a file's header shows, for a person who writes its profile."""
-    layout = _layout(data, source or Source(match="*"))
-    return list(layout.columns[:most])
+    columns = layout_of(data, source or Source(match="*")).columns
+    # one without a name at the end is a separator too many
+    return list((columns if not columns or columns[-1] else columns[:-1])[:most])
 
 
 def titled(data: bytes) -> Titled | None:
@@ -123,27 +131,29 @@ def titled(data: bytes) -> Titled | None:
     data : bytes
         Whole, or its first lines.
     """
-    text = [line.strip() for line in _as_utf8(data[:SAMPLE], "utf-8").decode("utf-8", errors="replace").splitlines()]
+    text = [line.strip() for line in as_utf8(data[:SAMPLE], "utf-8").decode("utf-8", errors="replace").splitlines()]
     lines = [(k, line) for k, line in enumerate(text[:_LOOKED_AT]) if line]
     if len(lines) < _FEWEST:
         return None
     later = [line for _, line in lines[len(lines) // 2 : -1]]
     first = separator_of(lines[0][1])
     # a damaged row or two make no title of a head
-    if first and median(line.count(first) for line in later) == lines[0][1].count(first):
+    below = [cells_of(line, first) for line in later]
+    if first and median(map(len, below)) == len(fitted(cells_of(lines[0][1], first), below)):
         return None
-    for separator in (",", ";", "\t", None):
-        counts = {len(line.split(separator)) for line in later}
-        if len(counts) == 1 and (cells := counts.pop()) > 1:
+    for separator in (",", ";", "\t", "whitespace"):
+        counts = {len(cells_of(line, separator)) for line in later}
+        if len(counts) == 1 and (count := counts.pop()) > 1:
             break
     else:
         return None
     begin = len(lines) - 1  # the last one may be cut
-    while begin and len(lines[begin - 1][1].split(separator)) == cells:
+    while begin and len(cells_of(lines[begin - 1][1], separator)) == count:
         begin -= 1
     place, head = lines[begin]
-    names = [] if any(map(_is_number, head.split(separator))) else [n.strip(' "') for n in head.split(separator)]
-    return Titled(place, separator or "whitespace", tuple(names), cells) if begin or separator is None else None
+    cells = cells_of(head, separator)
+    names = () if any(map(_is_number, cells)) else tuple(cells)
+    return Titled(place, separator, names, count) if begin or separator == "whitespace" else None
 
 
 def _is_number(cell: str) -> bool:
@@ -152,44 +162,6 @@ def _is_number(cell: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _layout(data: bytes, source: Source) -> Layout:
-    lines = trimmed(lines_of(as_bytes(_as_utf8(data, source.encoding))))
-    behind_header = np.arange(len(lines)) >= source.header_lines
-    lines = lines.take(behind_header & (lines.stop > lines.start))
-    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 30).to_list()
-    separator = source.separator or separator_of(first[0] if first else "")
-    if source.columns is not None:
-        return Layout(_untrimmed(lines, separator), tuple(source.columns), separator)
-    header = first[0] if first else ""
-    parts = header.split() if separator == "whitespace" else header.split(separator) if separator else [header]
-    names = tuple(part.strip().strip('"').strip() for part in parts) if first else ()
-    return Layout(_untrimmed(lines.take(np.arange(1, len(lines))), separator), names, separator)
-
-
-def _untrimmed(lines: Spans, separator: str | None) -> Spans:
-    """Give back the tabs at the end of the lines where the tab is the separator: they stand for empty cells."""
-    if separator != "\t" or len(lines) == 0:
-        return lines
-    full = lines_of(lines.buffer)
-    at = np.searchsorted(full.start, lines.start, side="right") - 1
-    return full.take(at)
-
-
-def _as_utf8(data: bytes, encoding: str) -> bytes:
-    try:
-        codec = codecs.lookup(encoding).name
-        if codec != "utf-8":
-            data = data.decode(encoding, errors="replace").encode("utf-8")
-    except (LookupError, TypeError, ValueError) as error:
-        raise UsageError(
-            "unknown_encoding",
-            f"The profile's encoding {encoding!r} cannot be used: {error}.",
-            "Write one that Python knows, such as utf-8, cp1252 or utf-16.",
-            {"encoding": encoding},
-        ) from error
-    return data.removeprefix(codecs.BOM_UTF8)
 
 
 def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
@@ -201,7 +173,8 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
             f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
             f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
-            "Correct the names in the profile's source, or its separator, header_lines or columns.",
+            advice_on(columns)
+            + "Correct the names in the profile's source, or its separator, header_lines or columns.",
             {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
     twice = sorted({column for column in wanted if columns.count(column) > 1})
@@ -232,18 +205,21 @@ def _with_points(name: str, cells: dict[str, pl.Series], source: Source) -> dict
     return cells
 
 
-def _cells(layout: Layout, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:
-    """Cut the cells of some columns out of the rows; also return which rows have as many cells as the header."""
+def _cells(layout: Layout, wanted: list[str]) -> tuple[Index, dict[str, pl.Series]]:
+    """Cut the cells of some columns out of the rows that have as many as there are columns.
+
+    Also return how many cells each row has, 0 where nobody can say.
+    """
     rows = layout.rows
-    whole = rows.stop - rows.start <= _LONGEST_ROW
+    count = np.zeros(len(rows), dtype=np.int64)
     parts: list[dict[str, pl.Series]] = [{name: pl.Series(name, [], dtype=pl.String) for name in wanted}]
-    looked_at = np.flatnonzero(whole)
+    looked_at = np.flatnonzero(rows.stop - rows.start <= LONGEST_ROW)
     # so that what is known of every byte is not held for all of a file
     for of_block in np.split(looked_at, _cuts(rows.take(looked_at))):
         if of_block.size:
-            whole[of_block], cells = _cut(layout, _alone(rows.take(of_block)), wanted)
+            count[of_block], cells = _cut(layout, _alone(rows.take(of_block)), wanted)
             parts.append(cells)
-    return whole, {name: pl.concat([part[name] for part in parts]) for name in wanted}
+    return count, {name: pl.concat([part[name] for part in parts]) for name in wanted}
 
 
 def _cuts(rows: Spans) -> Index:
@@ -258,8 +234,8 @@ def _alone(rows: Spans) -> Spans:
     return Spans(np.append(rows.buffer[first:last], np.uint8(_FEED)), rows.start - first, rows.stop - first)
 
 
-def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:
-    """Cut the cells of some columns out of some rows, with which the buffer begins and ends but for a byte."""
+def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Index, dict[str, pl.Series]]:
+    """Do that for some rows, with which the buffer begins and ends but for a byte."""
     buffer, width = rows.buffer, len(layout.columns)
     separator = layout.separator or "\x1f"
     if separator == "whitespace":
@@ -269,14 +245,14 @@ def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Flag, dict[str
     quote = buffer == _QUOTE
     quoted = bool(quote.any()) and layout.separator != "whitespace"
     mark = buffer == ord(separator) if ord(separator) < 128 else np.zeros(buffer.size, dtype=np.bool_)
-    whole = np.ones(len(rows), dtype=np.bool_)
+    even = np.ones(len(rows), dtype=np.bool_)
     if quoted:
         inside, even = _inside_quotes(quote, rows)
         mark &= ~inside
-        whole &= even
     places = np.flatnonzero(mark)
     low, high = np.searchsorted(places, rows.start), np.searchsorted(places, rows.stop)
-    whole &= high - low + 1 == width
+    count = np.where(even, high - low + 1, 0)
+    whole = count == width
     low, good = low[whole], rows.take(whole)
     # a file may have very many columns of which few are asked for: only these are cut
     bounds = np.append(places, 0)
@@ -288,7 +264,7 @@ def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Flag, dict[str
         text = Spans(buffer, start, stop).text(limit=_LONGEST_CELL).alias(name)
         cell = _unquoted(pl.col(name).str.strip_chars()) if quoted else pl.col(name).str.strip_chars()
         cells[name] = text.to_frame().select(cell.replace("", None)).to_series()
-    return whole, cells
+    return count, cells
 
 
 def _unquoted(cell: pl.Expr) -> pl.Expr:

@@ -43,7 +43,9 @@ _DATE = re.compile(r"((utc|gps) ?)?(date|day)( utc)?")
 _UNIT = {re.sub(r"[^a-z]", "", unit.lower()): unit for unit in TO_SI} | {"degs": "deg/s", "knots": "kn", "kts": "kn"}
 
 
-def draft_profile(file_name: str, columns: Sequence[str], titled: Titled | None = None) -> str:
+def draft_profile(
+    file_name: str, columns: Sequence[str], titled: Titled | None = None, encoding: str | None = None
+) -> str:
     """Return the draft of a profile for a delimited log, YAML with a ``?`` wherever a person has to look.
 
     Parameters
@@ -52,6 +54,8 @@ def draft_profile(file_name: str, columns: Sequence[str], titled: Titled | None 
         Every column of the log.
     titled : Titled, optional
         Where lines of title stand before the table.
+    encoding : str, optional
+        By which the columns were read, where that is not UTF-8.
     """
     if titled is not None:
         columns = titled.names or [f"column {k}" for k in range(1, titled.count + 1)]
@@ -62,6 +66,7 @@ def draft_profile(file_name: str, columns: Sequence[str], titled: Titled | None 
     )
     lines = [
         *_head(file_name, "columns"),
+        *([f'    encoding: "{encoding}?"  # the text is not in UTF-8'] if encoding else []),
         *_table(titled, columns),
         _time(day, clock),
         "    channels:",

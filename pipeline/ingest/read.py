@@ -9,7 +9,8 @@ import polars as pl
 
 from kempf.pipeline.ingest import sniff
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
-from kempf.pipeline.ingest.decoded import Decoded
+from kempf.pipeline.ingest.decoded import Decoded, Misfit
+from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
@@ -71,12 +72,17 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         raise DataRejected("empty_log", f"{name} is empty.", "Copy the file again from the logger.", {"name": name})
     notes: list[str] = []
     packed = False
+    source = profile.source_for(name)
     if file.read(0, len(sniff.MCAP_MAGIC)) != sniff.MCAP_MAGIC:
         data = _whole(name, file)
         content, notes = unpack(name, data)
         packed = content is not data
+        wide = utf16_of(content[: sniff.SAMPLE])
+        if wide is not None:
+            content = as_utf8(content, wide)
+            notes = [*notes, "The file is encoded as UTF-16, and was read so."]
+            source = source and source.model_copy(update={"encoding": "utf-8"})
         file = LogFile(content)
-    source = profile.source_for(name)
     log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
     kind = sniff.no_log(file.read(0, sniff.SAMPLE))
     if kind is not None:
@@ -113,8 +119,8 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             yield clocks.set_right(checked)
             continue
         if summary.tally.records_kept == 0:
-            raise _nothing(name, checked, summary)
-        own = (*summary.notes(), *notes, *dated.notes, *checked.notes, *clocks.notes())
+            raise _nothing(name, checked, summary, decoded.misfits)
+        own = (*summary.notes(decoded.misfits), *notes, *dated.notes, *checked.notes, *clocks.notes())
         yield replace(clocks.set_right(checked), notes=own)
 
 
@@ -133,16 +139,18 @@ class _Summary:
             times = [*(self.unset or ()), *unset]
             self.unset = min(times), max(times)
 
-    def notes(self) -> list[str]:
-        """Return what a log is to be doubted for of which most was refused, other than for what it is no log of."""
+    def notes(self, misfits: tuple[Misfit, ...]) -> list[str]:
+        """Return what a log is to be doubted for of which much was refused, other than for what it is no log of."""
+        doubts = [f"{misfit.found} {misfit.next_step}" for misfit in misfits]
         refused = {reason: n for reason, n in self.tally.by_reason.items() if reason not in _ORDINARY}
         most = max(sorted(refused), key=lambda reason: refused[reason], default="")
-        if not most or refused[most] <= _MOSTLY * self.tally.records_read:
-            return []
+        if not most or refused[most] <= _MOSTLY * self.tally.records_read or (most == "malformed" and misfits):
+            return doubts
         why = " Do its rows run backwards in time?" if most == "clock_back" else ""
         return [
             f"{refused[most]} refusals, most of the log, are {most}: see whether the profile fits it, and `kempf logs "
-            f"rejected`.{why}"
+            f"rejected`.{why}",
+            *doubts,
         ]
 
 
@@ -181,6 +189,7 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
             f"the columns found in it are {', '.join(repr(c) for c in columns) or 'none'}.",
+            f"{advice_on(columns)}"
             f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. "
             + _SEE_PROFILE,
             {"name": name, "columns": columns, "patterns": [s.match for s in profile.sources]},
@@ -199,7 +208,7 @@ def _whole(name: str, log: LogFile) -> bytes:
     return log.whole()
 
 
-def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
+def _nothing(name: str, last: Readings, summary: _Summary, misfits: tuple[Misfit, ...]) -> DataRejected:
     counts = summary.tally.by_reason
     listed = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda c: (-c[1], c[0])))
     years = ""
@@ -209,8 +218,9 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
     step = {
         "clock_unset": "The logger's clock was not set, or the unit of the time column is another: correct the unit in "
         "the profile or the times in a copy of the log, or ingest another log.",
-        "malformed": "See whether the profile says how time and columns are written: a date such as 31/12/2025, by "
-        "itself or before the time of day, takes `date_form: dd/mm/yyyy`. " + _SEE_PROFILE,
+        "malformed": misfits[0].next_step
+        if misfits
+        else "See whether the profile says how time and columns are written. " + _SEE_PROFILE,
         "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
         "no_channel": "The log holds none of the canonical channels: check that it is the right file.",
@@ -220,7 +230,7 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
         "no_valid_reading",
         f"{name} holds no valid reading: {summary.tally.records_read} records, "
         f"of them {listed or 'none usable'}.{years}{_sample(last, most)}"
-        f"{''.join(f' {note}' for note in last.notes[:_NOTES])}",
+        f"{''.join(f' {note}' for note in (*(misfit.found for misfit in misfits), *last.notes)[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
         {
             "name": name,

@@ -1,8 +1,9 @@
 """Angles that count on beyond one turn: which of them continue a course, and which are nonsense.
 
 A heading that an observer or an integrating gyro writes goes on past 360 deg. Such a reading is taken, on the circle,
-where it is part of a run: each less than half a turn from the one before. A run counts that has a reading within one
-turn, or that moves; a constant one is the mark of an instrument that has nothing to say.
+where it is part of a run: each less than an eighth of a turn from the one before. A run counts that has a reading
+within one turn, or that moves; a constant one is the mark of an instrument that has nothing to say, such as the 511 of
+AIS and ECDIS.
 """
 
 from __future__ import annotations
@@ -21,11 +22,18 @@ _TURN = 2.0 * np.pi
 #: Beyond so many turns an angle is nonsense, whatever stands beside it.
 _MOST_TURNS = 100
 
+#: A change of this size from one reading to the next ends a run. No ship turns so far between two readings of a zigzag,
+#: and 511 deg, which says that there is no heading, is three times as far beyond one turn.
+_LEAP = np.pi / 4.0
+
 #: A run beyond one turn counts once it has so many readings, and so many different ones.
 _FEWEST, _DIFFERENT = 5, 3
 
 #: So many readings of a run that does not move are waited for.
 _LONGEST = 1 << 16
+
+#: So often it is looked at anew what can be decided without what is held back, before all of a part is.
+_ROUNDS = 20
 
 
 class Turns:
@@ -53,16 +61,23 @@ class Turns:
         held = np.zeros(len(work), dtype=np.bool_)
         circular = [] if work.ends else _circular(work)
         for source, own in sources.items():
-            waits = own.size
-            for name, values in circular:
-                at, value = _offered(values, own)
-                if _beyond(value).any():
-                    _, first = _walk(self._last.get((source, name), np.nan), value, ends=False)
-                    waits = min(waits, int(np.searchsorted(own, at[first]))) if first < at.size else waits
-            if waits < own.size:
+            decided = own
+            # what is held of one channel, or for its instant, may be what decided a reading before it
+            for _ in range(_ROUNDS):
+                waits = decided.size
+                for name, values in circular:
+                    at, value = _offered(values, decided)
+                    if _beyond(value).any():
+                        _, first = _walk(self._last.get((source, name), np.nan), value, ends=False)
+                        waits = min(waits, int(np.searchsorted(decided, at[first]))) if first < at.size else waits
+                if waits == decided.size:
+                    break
                 # what shares an instant is checked together
-                time = work.time_utc_ns[own]
-                held[own[np.searchsorted(time, time[waits]) :]] = True
+                time = work.time_utc_ns[decided]
+                decided = decided[: np.searchsorted(time, time[waits])]
+            else:
+                decided = decided[:0]
+            held[own[decided.size :]] = True
         return held
 
     def wrapped(self, work: Decoded, sources: Mapping[int, Index]) -> dict[str, Values]:
@@ -119,14 +134,14 @@ def _walk(last: float, value: Float, *, ends: bool) -> tuple[Flag, int]:
         return counts, value.size
     at = np.flatnonzero(np.abs(value) <= _MOST_TURNS * _TURN)
     near = value[at]
-    cuts = np.flatnonzero(np.abs(np.diff(near)) >= np.pi) + 1
+    cuts = np.flatnonzero(np.abs(np.diff(near)) >= _LEAP) + 1
     for first, stop in pairwise([0, *cuts.tolist(), at.size]):
         run = near[first:stop]
         begin = 0
         while begin < run.size:
             part = run[begin : begin + _LONGEST]
             moves = part.size >= _FEWEST and np.unique(part).size >= _DIFFERENT
-            if (begin == 0 and abs(run[0] - last) < np.pi) or not _beyond(part).all() or moves:
+            if (begin == 0 and abs(run[0] - last) < _LEAP) or not _beyond(part).all() or moves:
                 counts[at[first:stop][begin:]] = True
                 last = float(run[-1])
                 break

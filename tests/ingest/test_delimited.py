@@ -1,6 +1,8 @@
 """Delimited text: separators, headers, encodings, times, cells."""
 
+import io
 import math
+import tarfile
 from datetime import UTC, datetime
 from time import process_time
 
@@ -103,6 +105,13 @@ def test_epoch_numbers(unit, text):
         ("2025-05-03T10:47:01,25+03:00", "2025-05-03T07:47:01.250000+00:00"),
         ("2025-05-03T02:17:01.000001-0530", "2025-05-03T07:47:01.000001+00:00"),
         ("2024-02-29T23:59:60Z", "2024-03-01T00:00:00+00:00"),
+        ("2025-05-03 7:47:01Z", "2025-05-03T07:47:01+00:00"),
+        ("2025-05-03T7:47:01.25+00:00", "2025-05-03T07:47:01.250000+00:00"),
+        ("2025-05-03 07:47:01.123 UTC", "2025-05-03T07:47:01.123000+00:00"),
+        ("2025-05-03 07:47:01 Z", "2025-05-03T07:47:01+00:00"),
+        ("2025-05-03 07:47:01UTC", "2025-05-03T07:47:01+00:00"),
+        ("2025-05-03 10:47:01 +0300", "2025-05-03T07:47:01+00:00"),
+        ("20250503T074701.147Z", "2025-05-03T07:47:01.147000+00:00"),
     ],
 )
 def test_iso_times(text, expected):
@@ -238,3 +247,142 @@ def test_nothing_that_can_be_read_is_shown_by_a_sample():
         read("utc,sog,hdg\n03/05/2025 07:47:01,8,90\n")
     assert error.value.code == "no_valid_reading" and "'03/05/2025 07:47:01,8,90'" in error.value.message
     assert "date_form" in error.value.next_step
+
+
+@pytest.mark.parametrize("sign", [",", ";", "\t"])
+@pytest.mark.parametrize(("header", "row"), [("", ","), (",", ""), (",", ",")])
+def test_a_separator_behind_the_last_cell_is_read_in_rows_in_the_header_and_in_both(header, row, sign):
+    lines = [f"utc,sog,hdg{header}", *(f"{T}{k}Z,{k},{k + 90}{row}" for k in range(1, 9)), f"{T}9Z,3"]
+    readings = read("\n".join(lines).replace(",", sign))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(k + 90) for k in range(1, 9)]
+    assert readings.tally.by_reason == {"malformed": 1}
+    with pytest.raises(UsageError) as error:
+        read_log("log.csv", "\n".join(lines).replace(",", sign).encode(), VesselProfile())
+    assert error.value.details["columns"] == ["utc", "sog", "hdg"]
+
+
+def test_a_last_cell_that_is_empty_for_once_is_no_separator_too_many():
+    readings = read(f"utc,sog,hdg\n{T}1Z,1,\n{T}2Z,1,\n{T}3Z,1,90,\n{T}4Z,1,90\n")
+    assert readings.frame["heading_rad"].to_list() == [None, None, math.radians(90)]
+    assert readings.rejected["record"].to_list() == [2]
+
+
+@pytest.mark.parametrize(
+    ("more", "source", "found", "todo"),
+    [
+        (",7", {}, "All 30 rows have 4 cells parted by ','; the header has 3.", "`columns` of the source"),
+        (",7,7", {}, "All 30 rows have 5 cells parted by ','; the header has 3.", "`decimal: ','`"),
+        (
+            ",7",
+            {"header_lines": 1, "columns": ["utc", "sog", "hdg"]},
+            "All 30 rows have 4 cells parted by ','; the profile names 3 columns.",
+            "`columns` of the source",
+        ),
+        (
+            ",7",
+            {"separator": "whitespace"},
+            "All 30 rows have 2 cells parted by blanks; the header has 3.",
+            "correct `separator`",
+        ),
+    ],
+)
+def test_rows_with_another_number_of_cells_are_reported_with_both_numbers(more, source, found, todo):
+    text = "utc,sog,hdg\n" + "".join(f"{T}{k % 10}Z,1,2{more}\n" for k in range(30))
+    if source.get("separator"):
+        text = text.replace("sog,hdg", " sog hdg").replace("utc,", "utc").replace(f",1,2{more}", " 1,2")
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(**source))
+    assert error.value.code == "no_valid_reading" and error.value.details["by_reason"] == {"malformed": 30}
+    assert found in error.value.message and todo in error.value.next_step
+    assert "date_form" not in error.value.next_step
+
+
+@pytest.mark.parametrize(
+    ("text", "time", "advice"),
+    [
+        ("03/05/2025 06:00:0{}.638 AM", {"date_form": "dd/mm/yyyy"}, "without AM and PM"),
+        ("03/05/2025 06:00:0{}", {}, "`date_form`"),
+        ("06:00:0{}.638", {}, "date: DATE"),
+        ("4578{}.250007384", {}, "its `unit`"),
+        ("2025-05-03 06:00:0{}:638", {}, "a point before the decimals of a second"),
+        ("2025-05-03 06:00:0{} CEST", {}, "such as +02:00"),
+        ("2025-05-03T06:00:0{}Z", {"unit": "s"}, "leave `unit` out"),
+        ("yesterday at {}", {}, "ISO 8601"),
+    ],
+)
+def test_times_that_cannot_be_read_are_quoted_with_their_column_and_the_forms_that_can(text, time, advice):
+    rows = "".join(f"{text.format(k)},1,2\n" for k in range(1, 9))
+    with pytest.raises(DataRejected) as error:
+        read("utc,sog,hdg\n" + rows, profile(None, {"column": "utc", **time}))
+    assert f"{text.format(5)!r} in the column 'utc' of row 5 (line 6)" in error.value.message
+    assert "The time of all 8 rows cannot be read" in error.value.message
+    assert advice in error.value.next_step and "2025-05-03T06:00:00.5Z" in error.value.next_step
+
+
+def test_many_times_that_cannot_be_read_are_noted_and_a_few_are_not():
+    def notes(bad):
+        rows = "".join(f"{'?' if k < bad else ''}2025-05-03T07:{k // 60:02d}:{k % 60:02d}Z,1,2\n" for k in range(900))
+        readings = read("utc,sog,hdg\n" + rows)
+        assert readings.tally.by_reason == {"malformed": bad}
+        return readings.notes
+
+    assert notes(19) == ()
+    (note,) = notes(30)
+    assert note.startswith("The time of 30 of 900 rows cannot be read, such as '?2025-05-03T07:00:15Z'")
+
+
+def test_an_hour_of_one_digit_beside_hours_of_two_costs_no_row():
+    text = "utc,sog,hdg\n2025-05-03 9:59:59,1,2\n2025-05-03 10:00:00,1,2\n2025-05-03 7,1,2\n2025-05-03 7:47,1,2\n"
+    readings = read(text)
+    assert (readings.frame["time_utc_ns"][1] - readings.frame["time_utc_ns"][0]) == 10**9
+    assert readings.rejected["record"].to_list() == [2, 3]
+    assert readings.notes == ("Times without a zone are taken as UTC.",)
+
+
+@pytest.mark.parametrize(
+    ("header", "sign"),
+    [
+        ('utc,"depth, below keel",sog,hdg', ","),
+        ('"utc", "depth, below ""the"" keel" , "sog","hdg"', ","),
+        ('utc;"depth, below, the, keel";sog;hdg', ";"),
+        ("utc,depth 5' below,sog,hdg", ","),
+        ('utc,"depth,sog,hdg', ","),
+    ],
+)
+def test_the_header_may_have_separators_between_quotation_marks(header, sign):
+    rows = f"{T}1Z,7,10,90\n{T}2Z,8,11,91\n".replace(",", sign)
+    readings = read(f"{header}\n{rows}")
+    assert readings.frame["heading_rad"].to_list() == [math.radians(90), math.radians(91)]
+
+
+@pytest.mark.parametrize("header", ['t,"depth, below keel",hdg', "t,depth,hdg", "t,depth,hdg,"])
+@pytest.mark.parametrize("more", ["", ","])
+def test_a_header_with_quoted_names_or_a_separator_at_its_end_is_no_title(header, more):
+    text = f"{header}\n" + f"1.5,2,3{more}\n" * 9
+    assert delimited.titled(text.encode()) is None
+
+
+@pytest.mark.parametrize("place", [0, 1, 5, 199])
+@pytest.mark.parametrize("length", [16, 4096, 60_000])
+def test_a_block_of_nul_bytes_costs_one_row_wherever_it_stands(place, length):
+    lines = ["utc,sog,hdg", *(f"2025-05-03T07:{k // 60:02d}:{k % 60:02d}Z,1,{k}" for k in range(200))]
+    lines[place] = "\0" * length + lines[place]
+    readings = read("\n".join(lines))
+    assert readings.rejected["record"].to_list() == ([place - 1] if place else [])
+    assert readings.tally.records_read == 200
+
+
+@pytest.mark.parametrize("data", [bytes(100), b"\0\n" * 99, bytes(50_000) + b"\x01\x02,\x03\n" * 9, b"a,b\0\n" * 99])
+def test_other_bytes_with_nul_among_them_are_no_text(data):
+    with pytest.raises(DataRejected) as error:
+        read_log("log.csv", data, profile())
+    assert error.value.code == "unknown_format"
+
+
+def test_an_archive_is_named_as_one():
+    stream = io.BytesIO()
+    with tarfile.open(fileobj=stream, mode="w") as archive:
+        archive.addfile(tarfile.TarInfo("log.csv"), io.BytesIO())
+    with pytest.raises(DataRejected, match="is a tar archive") as error:
+        read_log("log.tar", stream.getvalue(), profile())
+    assert error.value.code == "unknown_format"

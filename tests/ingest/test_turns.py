@@ -90,6 +90,22 @@ def test_nonsense_is_refused_and_counted(place: int, wrong: list[float]) -> None
     assert readings.notes == ()
 
 
+@pytest.mark.parametrize("wrong", [[511.0], [511.0] * 3, [511.0] * 90, [409.5, 409.5]])
+@pytest.mark.parametrize("place", [0, 40, 90, 100])
+def test_a_leap_out_and_back_is_no_heading_that_counts_on_however_near_north_she_heads(place, wrong) -> None:
+    values = course(100, 335.0, 359.5)
+    readings = read_csv(np.concatenate([values[:place], wrong, values[place:]]))
+    assert readings.tally.by_reason == {"out_of_range": len(wrong)}
+    assert readings.rejected["record"].to_list() == list(range(place, place + len(wrong)))
+    assert readings.notes == ()
+    same_course(readings, values)
+
+
+def test_a_heading_that_counts_on_goes_on_behind_a_gap_in_which_she_turned() -> None:
+    values = np.concatenate([course(100, 300.0, 400.0), course(100, 500.0, 560.0)])
+    assert read_csv(values).tally.records_rejected == 0
+
+
 def test_a_spike_within_a_heading_that_counts_on_costs_itself_alone() -> None:
     values = course(300, 10.0, 1200.0)
     values[200] = 9999.0
@@ -180,7 +196,8 @@ def wandering(seed: int, n: int) -> Decoded:
     )
 
 
-@pytest.mark.parametrize("seed", range(60))
+# where what is held back decided a reading before it
+@pytest.mark.parametrize("seed", [*range(60), 68, 198, 200, 236])
 def test_it_does_not_matter_where_the_log_is_cut(seed: int) -> None:
     draw = random.Random(1000 + seed)
     whole = wandering(seed, draw.choice([1, 3, 40, 200]))

@@ -10,12 +10,12 @@ from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
-#: LoggerTimes of one source, by which it is judged whether several of its sentences share one.
+#: Stamps of one source, by which it is judged whether several of its sentences share one.
 _LEAST = 20
 #: Share of the stamps that are whole seconds where all are meant to be, and of those that several sentences of a
 #: source share where it is no accident.
 _WHOLE, _SHARED = 0.99, 0.1
-#: Share of the lines that have the stamp of the line before where they come in bursts; several instruments may well speak
+#: Share of the lines that have the stamp of the line before where they come in bursts; several instruments may speak
 #: in one millisecond.
 _BESIDE_EACH_OTHER = 0.5
 #: A stamp waits for so many usual distances of the stamps at most: a longer one is a pause of the log.
@@ -123,7 +123,7 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     Parameters
     ----------
     stamp_ns, full_ns : ndarray of int64, shape (n,)
-        LoggerTimes and what sentences say of date and time; `NO_TIME` where there is none.
+        Stamps, and what sentences say of date and time; `NO_TIME` where there is none.
     fix : ndarray of bool, shape (n,)
         Sentences that are believed.
     """

@@ -30,11 +30,18 @@ _REPEATED, _FEWEST_ROWS, _FEWEST_STAMPS = 0.5, 20, 3
 #: Stamps so many rows apart are reported, where the interval does not fit.
 _PAUSE = 20
 
+_NO_ZONE = "Times without a zone are taken as UTC."
+
 _PARTS = {"yyyy": r"(?<y>\d{4})", "yy": r"(?<y>\d{2})", "mm": r"(?<m>\d{1,2})", "dd": r"(?<d>\d{1,2})"}
 _ISO_DATES = r"^(?<y>\d{4})-?(?<m>\d{2})-?(?<d>\d{2})$"
 #: hh:mm, hh:mm:ss or hhmmss, decimals, and a zone behind them
-_CLOCK = r"^(?<h>\d{1,2}):(?<m>\d{2})(?::(?<s>\d{2})(?<f>[.,]\d+)?)?(?<z>[Zz]|[+-]\d.*)?$"
-_PLAIN_CLOCK = r"^(?<h>\d{2})(?<m>\d{2})(?<s>\d{2})(?<f>[.,]\d+)?(?<z>[Zz]|[+-]\d.*)?$"
+_ZONE = r"(?: ?(?<z>[Zz]|UTC|[+-]\d.*))?$"
+_CLOCK = r"^(?<h>\d{1,2}):(?<m>\d{2})(?::(?<s>\d{2})(?<f>[.,]\d+)?)?" + _ZONE
+_PLAIN_CLOCK = r"^(?<h>\d{2})(?<m>\d{2})(?<s>\d{2})(?<f>[.,]\d+)?" + _ZONE
+
+#: A date, what parts it from the time of day, and that; the second has seconds, as ISO 8601 here.
+_INSTANT = r"^(\S+?)[T\s]+(.+)$"
+_TO_THE_SECOND = r"^(\S+?)[T\s]+(\d{1,2}:\d{2}:\d{2}.*|\d{6}.*)$"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,14 +88,16 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
     if column.date is not None and column.time is not None:
         instant, good = _of_two(cells[column.date], cells[column.time], column, notes)
     elif column.column is not None and column.date_form is not None:
-        # the date, what parts it from the time of day, and that
-        text = cells[column.column]
-        date, time = (text.str.extract(r"^(\S+?)[T\s]+(.+)$", group) for group in (1, 2))
-        instant, good = _of_two(date, time, column, notes)
+        instant, good = _of_two(*_parted(cells[column.column], _INSTANT), column, notes)
     elif column.unit is None:
-        instant, good, zoned = iso_instants(spans_of(cells[column.columns[0]]))
+        text = cells[column.columns[0]]
+        instant, good, zoned = iso_instants(spans_of(text))
         if bool(np.any(good & ~zoned)):
-            notes.append("Times without a zone are taken as UTC.")
+            notes.append(_NO_ZONE)
+        # an hour of one digit, a blank before the zone, the basic form
+        odd = np.flatnonzero(stated & ~good)
+        if odd.size:
+            instant[odd], good[odd] = _of_two(*_parted(text.gather(odd), _TO_THE_SECOND), column, notes)
     else:
         instant, good = decimal_times(cells[column.columns[0]], column.unit)
         good &= np.abs(instant) < _FARTHEST
@@ -182,9 +191,14 @@ def _of_two(date: pl.Series, clock: pl.Series, column: TimeColumn, notes: list[s
         good &= known & (np.abs(since) < _FARTHEST)
         return np.where(good, midnight + np.where(good, since, 0), 0), good
     instant, good, zoned = iso_instants(spans_of(day + "T" + _iso_clock(clock)))
-    if bool(np.any(good & ~zoned)):
-        notes.append("Times without a zone are taken as UTC.")
+    if bool(np.any(good & ~zoned)) and _NO_ZONE not in notes:
+        notes.append(_NO_ZONE)
     return instant, good
+
+
+def _parted(instant: pl.Series, form: str) -> tuple[pl.Series, pl.Series]:
+    """Return date and time of day of instants, null where they are not of the form."""
+    return instant.str.extract(form, 1), instant.str.extract(form, 2)
 
 
 def _iso_dates(text: pl.Series, form: str | None) -> pl.Series:
@@ -207,6 +221,7 @@ def _iso_clock(text: pl.Series) -> pl.Series:
     for pattern in (_CLOCK, _PLAIN_CLOCK):
         parts = pl.col("text").str.extract_groups(pattern).struct
         rest = [parts.field(key).fill_null(nothing) for key, nothing in (("s", "00"), ("f", ""), ("z", ""))]
+        rest[2] = rest[2].replace("UTC", "Z")
         shown.append(
             parts.field("h").str.pad_start(2, "0") + ":" + parts.field("m") + ":" + rest[0] + rest[1] + rest[2]
         )

@@ -1,0 +1,154 @@
+"""Why many rows of delimited text are malformed: their number of cells, or how their times are written."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+
+import numpy as np
+import polars as pl
+
+from kempf.pipeline.ingest.decoded import Misfit
+from kempf.pipeline.ingest.layout import Layout
+from kempf.pipeline.ingest.spans import Index, Spans
+from kempf.schemas.profile import TimeColumn
+
+#: Damage is a few rows here and there: of so many, and of such a share, the layout is to blame.
+_FEWEST, _SHARE = 20, 0.01
+
+#: Share of a stretch of rows that makes it one of rows with another number of cells.
+_DENSE = 0.9
+
+#: Characters of a cell that a message quotes.
+_CUT = 60
+
+_FORMS = (
+    "Times are read as ISO 8601, such as 2025-05-03T06:00:00.5Z or 2025-05-03 06:00:00.5+02:00; with `date_form: "
+    "dd/mm/yyyy` or the like where the date is written another way before hh:mm:ss; with `date` and `time` where they "
+    "stand in two columns; as a number with `unit`. See docs/profile.md."
+)
+
+#: What to do about a time, by how it is written; the first that fits.
+_ADVICE = (
+    (r"(?i)\d ?[ap]\.?m\.?$", "Export the log with a 24-hour clock, without AM and PM."),
+    (
+        r"\d:\d\d:\d\d:\d+",
+        "Write a point before the decimals of a second, in a copy of the log or in the settings of its logger.",
+    ),
+    (
+        r"\d:\d\d(:\d\d)?[.,\d]* ?[A-Za-z]{2,5}$",
+        "Write the zone as Z, UTC or its offset, such as +02:00: abbreviations of zones are ambiguous.",
+    ),
+    (
+        r"^\d{1,2}:\d\d(:\d\d)?[.,\d]*\S*$",
+        "This is a time of day: name the column of its date, as `time: {date: DATE, time: TIME}`, or write the date "
+        "before it in a copy of the log.",
+    ),
+    (
+        r"^[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?$",
+        "This is a number: write its `unit` (s, ms, us or ns) into the source's time and, unless it counts from 1970, "
+        "its `start`. Days, as spreadsheets count them, are none of these: export them as dates.",
+    ),
+    (
+        r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ]\d{1,2}[-./ ]\d{1,4}(?!\d)",
+        "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`.",
+    ),
+)
+
+
+def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
+    """Return what is to be said of rows with another number of cells than there are columns; None if they are few.
+
+    Parameters
+    ----------
+    layout : Layout
+    count : ndarray of int64, shape (n,)
+        Cells of each row, 0 where nobody can say.
+    named : bool
+        Whether the profile names the columns, not the header.
+    """
+    n, width = len(layout.rows), len(layout.columns)
+    wrong = count[(count != width) & (count > 0)]
+    if not _many(wrong.size, n):
+        return None
+    kinds, often = np.unique(wrong, return_counts=True)
+    usual = int(kinds[np.argmax(often)])
+    at = np.flatnonzero(count == usual)
+    first, last = int(at[0]), int(at[-1])
+    where = ""
+    if at.size >= _DENSE * (last - first + 1) and first:
+        until = "on" if last >= n - 1 - _SHARE * n else f"to {_place(layout.rows, last)}"
+        where = f", from {_place(layout.rows, first)} {until}"
+        step = (
+            "Columns were added or taken away there: cut the log before that row and ingest both parts, each with the "
+            "line that names its columns."
+        )
+    elif layout.separator == "," and usual > width + 1:
+        step = (
+            "A comma that stands before decimals parts cells too: export the log with a decimal point, or with "
+            "semicolons between the cells and `decimal: ','` in the source. If none does, correct the header."
+        )
+    else:
+        step = (
+            "Write a name for every cell of a row into the header, in a copy of the log, or into `columns` of the "
+            "source (with `header_lines: 1` for the line that names them now); or correct `separator`."
+        )
+    expected = f"the profile names {width} columns" if named else f"the header has {width}"
+    parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
+        layout.separator, f" parted by {layout.separator!r}"
+    )
+    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}; {expected}."
+    return Misfit(found, step, wrong.size)
+
+
+def times_amiss(
+    rows: Spans, cells: Mapping[str, pl.Series], row: Index, unread: Index, column: TimeColumn
+) -> Misfit | None:
+    """Return what is to be said of times that cannot be read; None if they are few.
+
+    Parameters
+    ----------
+    rows : Spans
+        All rows, shape (n,).
+    cells : mapping of str to polars.Series of String
+        The columns of the time, each shape (m,).
+    row : ndarray of int64, shape (m,)
+        Numbers of the rows that they are of.
+    unread : ndarray of int64
+        Numbers of the rows whose time is there and cannot be read.
+    column : TimeColumn
+    """
+    if not _many(unread.size, len(rows)):
+        return None
+    # the first ones may be a line of units, or another header
+    one = int(unread[unread.size // 2])
+    shown = {key: str(text[int(np.searchsorted(row, one))])[:_CUT] for key, text in cells.items()}
+    quoted = " and ".join(f"{text!r} in the column {key!r}" for key, text in shown.items())
+    said = "".join(
+        f" with `{key}: {value}`"
+        for key, value in (("date_form", column.date_form), ("unit", column.unit))
+        if value is not None
+    )
+    found = (
+        f"The time of {_of_all(unread.size, len(rows)).lower()} rows cannot be read{said}, such as {quoted} of "
+        f"{_place(rows, one)}."
+    )
+    advice = [] if len(shown) > 1 else [step for form, step in _ADVICE if re.search(form, next(iter(shown.values())))]
+    if column.unit is not None:
+        advice = ["This is no number: leave `unit` out of the source's time."]
+    return Misfit(found, " ".join([*advice[:1], _FORMS]), unread.size)
+
+
+def _many(amiss: int, n: int) -> bool:
+    return 2 * amiss > n or (amiss >= _FEWEST and amiss >= _SHARE * n)
+
+
+def _of_all(some: int, n: int) -> str:
+    return f"All {n}" if some == n else f"{some} of {n}"
+
+
+def _place(rows: Spans, row: int) -> str:
+    """Return which row it is, and in which line of the file it stands, both from 1 on."""
+    before = rows.buffer[: int(rows.start[row])]
+    ends = np.count_nonzero(before == 10) or np.count_nonzero(before == 13)
+    return f"row {row + 1} (line {ends + 1})"
