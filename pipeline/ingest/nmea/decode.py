@@ -1,4 +1,4 @@
-"""NMEA 0183 logs, with or without ISO 8601 stamps in front of the lines, decoded in columns."""
+"""NMEA 0183 logs, with or without times in front of the lines, decoded in columns."""
 
 from __future__ import annotations
 
@@ -89,6 +89,11 @@ def _opening(frames: Frames) -> Bytes:
 
 def _notes(frames: Frames, kind: Index, reason: Code) -> list[str]:
     notes = []
+    if frames.unread_front is not None:
+        notes.append(
+            f"Text in front of the sentences, such as {frames.unread_front!r}, is not read as a time: an ISO 8601 "
+            "stamp such as 2025-05-03T07:47:01.147Z is, and the seconds or milliseconds since 1970 are."
+        )
     if not frames.zoned:
         notes.append("Stamps without a zone are taken as UTC.")
     if frames.broken_tags:
