@@ -378,3 +378,25 @@ def test_stamps_in_front_of_sentences_are_read_across_blocks(monkeypatch):
     text = "".join(f"[{1746258421 + k}.25] {sentence('HEHDT,11.37,T')}\n" for k in range(20))
     times = read(text).frame["time_utc_ns"].to_list()
     assert times == [(1746258421 + k) * 10**9 + 250_000_000 for k in range(20)]
+
+
+def _checksum_notes(text):
+    return [note for note in read(text).notes if "checksum and were refused" in note]
+
+
+def test_an_instrument_that_sends_no_checksum_is_named():
+    rudder = sentence("AGRSA,3.0,A,,")
+    heading = f"{sentence('HEHDT,11.37,T')}\r\n"
+    (note,) = _checksum_notes((heading + rudder[:-3] + "\r\n") * 4 + heading)
+    assert note.startswith("4 sentences AGRSA have no checksum and were refused")
+    (note,) = _checksum_notes((heading + rudder[:-2] + "00\r\n") * 4 + heading)
+    assert note.startswith("4 sentences AGRSA have a wrong checksum and were refused")
+    assert read((heading + rudder[:-3] + "\r\n") * 4).tally.by_reason["checksum"] == 4
+
+
+def test_sentences_that_were_damaged_here_and_there_accuse_no_instrument():
+    rudder = sentence("AGRSA,3.0,A,,")
+    sound = f"{rudder}\r\n{sentence('HEHDT,11.37,T')}\r\n"
+    assert _checksum_notes(sound * 3 + rudder[:-3] + "\r\n" + rudder[:-2] + "00\r\n") == []
+    # a maker's own sentence is not read, with a checksum or without
+    assert _checksum_notes(sound + "$PMTK,1\r\n") == []

@@ -55,6 +55,8 @@ class Frames:
     names: tuple[str, ...]
     #: Shape (n,). Code of the refusal, 0 for a whole sentence.
     reason: Code
+    #: Shape (n,). Whether the sentence ends with its own checksum.
+    summed: Flag
     #: Shape (n,). Time of arrival, from the text in front of the sentence or from its TAG block; `NO_TIME` where the
     #: log has none.
     stamp_ns: Nanoseconds
@@ -109,7 +111,7 @@ def frames_of(buffer: Bytes) -> Frames:
     def whole(name: str) -> NDArray[np.int64]:
         return np.concatenate([getattr(block, name) for block in blocks])
 
-    has, good, bad_tag = whole("has"), whole("good"), whole("bad_tag")
+    has, good, bad_tag, summed = whole("has"), whole("good"), whole("bad_tag"), whole("summed")
     lines = Spans(buffer, whole("start"), whole("stop"))
     address, names = _named(whole("key"))
     stamped = bool(has.any()) and float(np.mean(good[has])) >= _STAMPED
@@ -118,7 +120,7 @@ def frames_of(buffer: Bytes) -> Frames:
         reason[~good] = CODE[Reason.MALFORMED]
         reason[~good & bad_tag] = CODE[Reason.CHECKSUM]
     reason[address < 0] = CODE[Reason.MALFORMED]
-    reason[~whole("summed")] = CODE[Reason.CHECKSUM]
+    reason[~summed] = CODE[Reason.CHECKSUM]
     reason[~has] = CODE[Reason.MALFORMED]
     return Frames(
         lines=lines,
@@ -129,6 +131,7 @@ def frames_of(buffer: Bytes) -> Frames:
         address=address,
         names=names,
         reason=reason,
+        summed=summed.astype(np.bool_),
         stamp_ns=np.where(good, whole("stamp"), NO_TIME) if stamped else np.full(len(lines), NO_TIME),
         stamped=stamped,
         zoned=bool(np.all(whole("zoned")[good])) if stamped else True,
