@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import inf
 
 from kempf.warehouse.segments import Segment
 
-#: executes this close in two logs are one
+#: executes this close in two logs are one, where one log holds all that the other has
 _SAME_INSTANT_S = 2.0
+
+#: ... and where each holds a part of its own, so that fewer have to agree; and nominal rudder angles
+_SAME_EXECUTE_S, _SAME_RUDDER_DEG = 0.25, 1.0
 
 #: executes and overshoots this close are those of one signal, written twice: repeated runs differ by more somewhere
 _SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
@@ -18,16 +22,16 @@ def once(
 ) -> tuple[list[Segment], dict[str, str]]:
     """Return each manoeuvre once, and why the others are left out.
 
-    Of twins the longest stays, of equally long ones the first by log.
+    Of twins the one with the most executes stays, of those the longest, of equally long ones the first by log.
 
     Parameters
     ----------
     twins : callable
-        `_overlap` or `same`; is given the later choice first.
+        Such as `same`; is given the later choice first.
     """
     kept: list[Segment] = []
     left: dict[str, str] = {}
-    for segment in sorted(segments, key=lambda s: (s.start_utc_ns - s.end_utc_ns, s.log_id, s.start_utc_ns)):
+    for segment in sorted(segments, key=_first_choice):
         twin = next((other for other in kept if twins(segment, other)), None)
         if twin is None:
             kept.append(segment)
@@ -36,30 +40,76 @@ def once(
     return kept, left
 
 
+def _first_choice(segment: Segment) -> tuple[int, int, str, int]:
+    """Return by what segments are sorted: the most executes first."""
+    lasts_ns = segment.end_utc_ns - segment.start_utc_ns
+    return -len(segment.executes_utc_ns), -lasts_ns, segment.log_id, segment.start_utc_ns
+
+
 def _overlap(one: Segment, other: Segment) -> bool:
     """Return whether two segments share some time."""
     return one.end_utc_ns > other.start_utc_ns and other.end_utc_ns > one.start_utc_ns
 
 
 def same(one: Segment, other: Segment) -> bool:
-    """Return whether two segments are one manoeuvre: at the same time, executes at the same instants.
+    """Return whether two segments are one manoeuvre: at the same time, executes at the same instants to the same sides.
+
+    One log may hold more of it than the other, or each a part that the other lacks.
 
     Where neither log has a time of its own, since both count from a start that the profile states or from the moment
     at which the logger was switched on, the time says nothing: runs of a tank share their start. They are one only
     where what was measured is the same, as in two exports of one run.
     """
     # a zigzag that one log holds to its end may be broken off in the other
-    if not _overlap(one, other) or one.first_side != other.first_side or one.is_zigzag != other.is_zigzag:
+    if not _overlap(one, other) or one.is_zigzag != other.is_zigzag:
         return False
-    late = _apart_s(one, other)
+    apart = _apart_s(one, other), _apart_s(other, one)
     if one.own_time or other.own_time:
-        return late < _SAME_INSTANT_S
-    return max(late, _apart_s(other, one)) < _SAME_SAMPLE_S and _measured_alike(one, other)
+        return min(apart) < _SAME_INSTANT_S or _share_a_part(one, other)
+    return one.first_side == other.first_side and max(apart) < _SAME_SAMPLE_S and _measured_alike(one, other)
+
+
+def _share_a_part(one: Segment, other: Segment) -> bool:
+    """Return whether two logs hold one manoeuvre from other beginnings to other ends: the executes between agree."""
+    if one.log_id == other.log_id or (one.is_zigzag and abs(one.delta0_deg - other.delta0_deg) > _SAME_RUDDER_DEG):
+        return False
+    start, end = max(one.start_utc_ns, other.start_utc_ns), min(one.end_utc_ns, other.end_utc_ns)
+    # what one log ends with the other may show whole, and so an execute more
+    margin = round(_SAME_INSTANT_S * 1e9)
+    inside = [_between(segment, start + margin, end - margin) for segment in (one, other)]
+    if not all(inside):
+        return False
+    return max(_farthest_s(*inside), _farthest_s(*inside[::-1])) < _SAME_EXECUTE_S
+
+
+def _between(segment: Segment, start_ns: int, end_ns: int) -> list[tuple[int, int]]:
+    """Return the executes from one instant to another."""
+    return [execute for execute in _executes(segment) if start_ns <= execute[0] <= end_ns]
+
+
+def _executes(segment: Segment) -> list[tuple[int, int]]:
+    """Return the instant of every execute, and whether the rudder went to starboard, 1, to port, -1, or unknown, 0.
+
+    In a log that begins within a zigzag the first side is that of a leg whose execute it does not hold.
+    """
+    found = segment.detail.get("executes")
+    if found:
+        moved = [execute["rudder_after_deg"] - execute["rudder_before_deg"] for execute in found]
+        return [(at, 1 if way > 0.0 else -1) for at, way in zip(segment.executes_utc_ns, moved, strict=True)]
+    first = {"starboard": 1, "port": -1}.get(segment.first_side, 0)
+    return [(at, 0 if k else first) for k, at in enumerate(segment.executes_utc_ns)]
 
 
 def _apart_s(one: Segment, other: Segment) -> float:
-    """Return the longest time between an execute of the one and the nearest of the other, s."""
-    apart = [float(min(abs(theirs - ns) for theirs in other.executes_utc_ns)) * 1e-9 for ns in one.executes_utc_ns]
+    """Return the longest time between an execute of the one and the nearest to the same side of the other, s."""
+    return _farthest_s(_executes(one), _executes(other))
+
+
+def _farthest_s(executes: Sequence[tuple[int, int]], others: Sequence[tuple[int, int]]) -> float:
+    apart = [
+        min((abs(theirs - ns) * 1e-9 for theirs, its_way in others if way * its_way >= 0), default=inf)
+        for ns, way in executes
+    ]
     return max(apart, default=0.0)
 
 

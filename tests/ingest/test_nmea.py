@@ -9,11 +9,12 @@ from kempf.pipeline.ingest.mapping import nmea_corrections
 from kempf.pipeline.ingest.nmea import frames as nmea_frames
 from kempf.pipeline.ingest.nmea.decode import decode
 from kempf.pipeline.ingest.nmea.frames import frames_of
+from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import Readings
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import as_bytes
-from kempf.schemas.errors import UsageError
-from kempf.schemas.profile import ChannelMap, Source
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.profile import ChannelMap, Source, VesselProfile
 
 KN = 1852 / 3600
 
@@ -319,3 +320,85 @@ def test_the_size_of_the_blocks_changes_nothing(monkeypatch, size):
 def test_a_source_for_delimited_text_that_shares_the_pattern_is_left_aside():
     source = Source(match="*", time={"column": "t"}, channels={"h": ChannelMap(channel="heading", unit="deg")})
     assert read(stamped("HEHDT,11.37,T"), source).frame.height == 1
+
+
+@pytest.mark.parametrize(
+    "front",
+    [
+        "1746258421147 ",
+        "1746258421.147,",
+        "(1746258421.147000) ",
+        "[2025-05-03T07:47:01.147Z] ",
+        "<2025-05-03T09:47:01.147+02:00> ",
+        '"2025-05-03T07:47:01.147Z","',
+        "2025-05-03T07:47:01.147Z,COM3,",
+        "2025-05-03 07:47:01,147 INFO ",
+        "2025-05-03 07:47:01:147 ",
+        "2025-05-03 07:47:01.147 UTC ",
+        "2025-05-03 09:47:01.147 +0200 ",
+        "2025-05-03 02:47:01.147-05 ",
+        "2025-05-03 07:47:01.147 -67 ",
+        "2025/05/03 07:47:01.147 ",
+        "20250503T074701.147Z ",
+        "GPS1 2025-05-03T07:47:01.147Z -> ",
+        "2025-05-03T07:47:01.147Z|",
+    ],
+)
+def test_a_time_in_front_of_a_sentence_is_read_whatever_is_around_it(front):
+    readings = read((front + sentence("HEHDT,11.37,T") + "\r\n") * 2 + f"{front}{sentence('AGRSA,3.0,A,,')}\r\n")
+    assert set(readings.frame["time_utc_ns"].to_list()) == {ns("2025-05-03T07:47:01.147+00:00")}
+    assert not any("not read as a time" in note for note in readings.notes)
+
+
+@pytest.mark.parametrize(
+    "front",
+    ["07:47:01.147;", "03.05.2025 07:47:01.147;", "123456 ", "GPS1 ", "SN1746258421 ", "5746258421 ", "17462584211 "],
+)
+def test_text_in_front_of_the_sentences_that_is_no_time_is_shown(front):
+    line = f"{front}{sentence(RMC)}\r\n"
+    (note,) = [note for note in read(line * 2 + sentence("HEHDT,11.37,T")).notes if "not read as a time" in note]
+    assert f"such as {front!r}, is" in note
+    notes = read(line + 2 * f"{sentence('HEHDT,11.37,T')}\r\n").notes
+    assert not any("not read as a time" in note for note in notes)
+
+
+def test_a_log_without_any_time_says_that_the_text_in_front_is_none():
+    line = f"07:47:01.147;{sentence('HEHDT,11.37,T')}\r\n".encode()
+    with pytest.raises(DataRejected, match=r"such as '07:47:01\.147;', is not read as a time"):
+        read_log("test.nmea", line * 3, VesselProfile.model_validate({"vessel": "tug"}))
+
+
+def test_a_cell_of_a_table_ends_with_its_quote():
+    row = f'"2025-05-03T07:47:01.147Z","{sentence("HEHDT,11.37,T")}"\r\n'
+    readings = read(row)
+    assert readings.frame["time_utc_ns"].to_list() == [ns("2025-05-03T07:47:01.147+00:00")]
+    assert readings.frame["heading_rad"].to_list() == [math.radians(11.37)]
+
+
+def test_stamps_in_front_of_sentences_are_read_across_blocks(monkeypatch):
+    monkeypatch.setattr(nmea_frames, "_BLOCK", 64)
+    text = "".join(f"[{1746258421 + k}.25] {sentence('HEHDT,11.37,T')}\n" for k in range(20))
+    times = read(text).frame["time_utc_ns"].to_list()
+    assert times == [(1746258421 + k) * 10**9 + 250_000_000 for k in range(20)]
+
+
+def _checksum_notes(text):
+    return [note for note in read(text).notes if "checksum and were refused" in note]
+
+
+def test_an_instrument_that_sends_no_checksum_is_named():
+    rudder = sentence("AGRSA,3.0,A,,")
+    heading = f"{sentence('HEHDT,11.37,T')}\r\n"
+    (note,) = _checksum_notes((heading + rudder[:-3] + "\r\n") * 4 + heading)
+    assert note.startswith("4 sentences AGRSA have no checksum and were refused")
+    (note,) = _checksum_notes((heading + rudder[:-2] + "00\r\n") * 4 + heading)
+    assert note.startswith("4 sentences AGRSA have a wrong checksum and were refused")
+    assert read((heading + rudder[:-3] + "\r\n") * 4).tally.by_reason["checksum"] == 4
+
+
+def test_sentences_that_were_damaged_here_and_there_accuse_no_instrument():
+    rudder = sentence("AGRSA,3.0,A,,")
+    sound = f"{rudder}\r\n{sentence('HEHDT,11.37,T')}\r\n"
+    assert _checksum_notes(sound * 3 + rudder[:-3] + "\r\n" + rudder[:-2] + "00\r\n") == []
+    # a maker's own sentence is not read, with a checksum or without
+    assert _checksum_notes(sound + "$PMTK,1\r\n") == []

@@ -1,4 +1,4 @@
-"""NMEA 0183 logs, with or without ISO 8601 stamps in front of the lines, decoded in columns."""
+"""NMEA 0183 logs, with or without times in front of the lines, decoded in columns."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from kempf.pipeline.ingest.nmea.clock import clock_of
 from kempf.pipeline.ingest.nmea.compass_and_rudder import both_rudders, make_true
 from kempf.pipeline.ingest.nmea.fields import Said, read_type
 from kempf.pipeline.ingest.nmea.frames import Frames, frames_of
+from kempf.pipeline.ingest.nmea.unsummed import unsummed_notes
 from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
 from kempf.schemas.nmea import SENTENCES
 
@@ -89,6 +90,12 @@ def _opening(frames: Frames) -> Bytes:
 
 def _notes(frames: Frames, kind: Index, reason: Code) -> list[str]:
     notes = []
+    if frames.unread_front is not None:
+        notes.append(
+            f"Text in front of the sentences, such as {frames.unread_front!r}, is not read as a time: an ISO 8601 "
+            "stamp such as 2025-05-03T07:47:01.147Z is, and the seconds or milliseconds since 1970 are."
+        )
+    notes += unsummed_notes(frames, kind >= 0)
     if not frames.zoned:
         notes.append("Stamps without a zone are taken as UTC.")
     if frames.broken_tags:

@@ -1,6 +1,6 @@
 """From the bytes of an NMEA log to its sentences: stamp, address, checksum, by columns over the whole buffer.
 
-What a sentence says is read in `fields`, what a TAG block in front of it says in `tags`.
+What a sentence says is read in `fields`, a time in front of it in `stamps`, what a TAG block says in `tags`.
 """
 
 from __future__ import annotations
@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds, Reason
-from kempf.pipeline.ingest.nmea.tags import BACKSLASH, Tags, checksum_right, tags_of
-from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
+from kempf.pipeline.ingest.nmea.stamps import stamps_of
+from kempf.pipeline.ingest.nmea.tags import BACKSLASH, checksum_right, tags_of
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within, trimmed
 from kempf.pipeline.ingest.text.cells import words
-from kempf.pipeline.ingest.text.times import iso_instants
 
-_FEED, _RETURN, _BLANK, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 32, 36, 33, 42, 44
+_FEED, _RETURN, _BLANK, _QUOTE, _BANG, _DOLLAR, _STAR, _COMMA = 10, 13, 32, 34, 33, 36, 42, 44
 
 #: Bytes that are worked on at a time.
 _BLOCK = 1 << 20
@@ -30,6 +30,9 @@ _ADDRESS = 7
 
 #: Share of lines with a readable stamp from which a log counts as stamped.
 _STAMPED = 0.5
+
+#: Characters of a text in front of the sentences that a note shows.
+_SHOWN = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +55,8 @@ class Frames:
     names: tuple[str, ...]
     #: Shape (n,). Code of the refusal, 0 for a whole sentence.
     reason: Code
+    #: Shape (n,). Whether the sentence ends with its own checksum.
+    summed: Flag
     #: Shape (n,). Time of arrival, from the text in front of the sentence or from its TAG block; `NO_TIME` where the
     #: log has none.
     stamp_ns: Nanoseconds
@@ -59,6 +64,8 @@ class Frames:
     stamped: bool
     #: Whether every stamp names its zone.
     zoned: bool
+    #: Text in front of a sentence that is not read as a time, where most lines have such; else None.
+    unread_front: str | None
     #: Lines whose TAG block is not that of its checksum or has no end, so that what it says was left out.
     broken_tags: int
     #: Whether there are fields with blanks at their ends.
@@ -82,6 +89,7 @@ class _Block:
     summed: Flag  # ... with its own checksum
     good: Flag  # a readable stamp
     zoned: Flag  # ... that names its zone
+    unread: Flag  # text in front of the sentence that is no stamp
     bad_tag: Flag  # a TAG block without its own checksum
     padded: bool  # blanks beside a comma or an asterisk
 
@@ -103,7 +111,7 @@ def frames_of(buffer: Bytes) -> Frames:
     def whole(name: str) -> NDArray[np.int64]:
         return np.concatenate([getattr(block, name) for block in blocks])
 
-    has, good, bad_tag = whole("has"), whole("good"), whole("bad_tag")
+    has, good, bad_tag, summed = whole("has"), whole("good"), whole("bad_tag"), whole("summed")
     lines = Spans(buffer, whole("start"), whole("stop"))
     address, names = _named(whole("key"))
     stamped = bool(has.any()) and float(np.mean(good[has])) >= _STAMPED
@@ -112,7 +120,7 @@ def frames_of(buffer: Bytes) -> Frames:
         reason[~good] = CODE[Reason.MALFORMED]
         reason[~good & bad_tag] = CODE[Reason.CHECKSUM]
     reason[address < 0] = CODE[Reason.MALFORMED]
-    reason[~whole("summed")] = CODE[Reason.CHECKSUM]
+    reason[~summed] = CODE[Reason.CHECKSUM]
     reason[~has] = CODE[Reason.MALFORMED]
     return Frames(
         lines=lines,
@@ -123,12 +131,23 @@ def frames_of(buffer: Bytes) -> Frames:
         address=address,
         names=names,
         reason=reason,
+        summed=summed.astype(np.bool_),
         stamp_ns=np.where(good, whole("stamp"), NO_TIME) if stamped else np.full(len(lines), NO_TIME),
         stamped=stamped,
         zoned=bool(np.all(whole("zoned")[good])) if stamped else True,
+        unread_front=_front(lines, whole("body_start"), has, whole("unread")),
         broken_tags=int(np.sum(bad_tag)),
         padded=any(block.padded for block in blocks),
     )
+
+
+def _front(lines: Spans, body_start: Index, has: Index, unread: Index) -> str | None:
+    """Return the first text in front of a sentence that is no stamp, where most sentences have such a text."""
+    if not has.any() or float(np.mean(unread[has])) <= _STAMPED:
+        return None
+    i = int(np.argmax(unread))
+    text = lines.buffer[lines.start[i] : min(body_start[i] - 1, lines.start[i] + _SHOWN)].tobytes()
+    return text.partition(b"\\")[0].decode("utf-8", errors="replace")
 
 
 def _cuts(buffer: Bytes) -> list[tuple[int, int]]:
@@ -171,8 +190,9 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
         first = first_within(openings, tags.behind, lines.stop)
     has = first >= 0
     first = np.where(has, first, lines.start)
-    # another asterisk behind this one would be no digit of a checksum
-    star = np.maximum(lines.stop - 3, 0)
+    # another asterisk behind this one would be no digit of a checksum; a cell of a table may end with its quote
+    quoted = buffer[np.maximum(lines.stop - 1, 0)] == _QUOTE
+    star = np.maximum(lines.stop - 3 - quoted, 0)
     summed = has & (buffer[star] == _STAR) & checksum_right(buffer, prefix, first, star)
     start = np.where(has, first + 1, lines.start)
     stop = np.where(has, np.where(summed, star, lines.stop), start)
@@ -181,7 +201,7 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
     beside = buffer[np.minimum(blank + 1, buffer.size - 1)]
     low, high = np.searchsorted(comma, start), np.searchsorted(comma, stop)
     address_stop = np.where(low < high, np.append(comma, 0)[np.minimum(low, comma.size)], stop)
-    stamp, good, zoned = _stamps(lines, first, tags)
+    stamps = stamps_of(lines, first, tags)
     return _Block(
         start=lines.start + at,
         stop=lines.stop + at,
@@ -191,11 +211,12 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
         first_comma=low + before,
         commas=high - low,
         key=_packed(buffer, start, address_stop),
-        stamp=stamp,
+        stamp=stamps.time_utc_ns,
         has=has,
         summed=summed,
-        good=good,
-        zoned=zoned,
+        good=stamps.good,
+        zoned=stamps.zoned,
+        unread=stamps.unread & has,
         bad_tag=tags.broken,
         padded=bool(np.any((buffer[blank - 1] == _COMMA) | (beside == _COMMA) | (beside == _STAR))),
     )
@@ -217,24 +238,3 @@ def _named(key: Index) -> tuple[Index, tuple[str, ...]]:
     names = sorted(set(shown) - {""}, key=lambda name: (len(name), name))
     place = {name: k for k, name in enumerate(names)} | {"": -1}
     return np.array([place[name] for name in shown], dtype=np.int64)[code], tuple(names)
-
-
-def _stamps(lines: Spans, first: Index, tags: Tags) -> tuple[Nanoseconds, Flag, Flag]:
-    """Read the ISO 8601 stamp in front of the sentence, up to a blank, a comma or a semicolon; else the TAG block's."""
-    buffer = lines.buffer
-    stop = np.maximum(np.minimum(first, tags.start), lines.start)
-    if not bool(np.any(stop > lines.start)):
-        return tags.time_utc_ns, tags.timed, tags.timed
-    start = lines.start
-    # most stamps are set off by one sign, some by a sign with blanks around it
-    for _ in range(2):
-        end = buffer[np.maximum(stop - 1, 0)]
-        cut = (stop > start) & ((end == _COMMA) | (end == ord(";")) | is_blank(end))
-        if not cut.any():
-            break
-        stop = stop - cut
-    else:
-        stop = trimmed(Spans(buffer, start, stop)).stop
-    stamp = Spans(buffer, start, stop)
-    time, good, zoned = iso_instants(stamp)
-    return np.where(good, time, tags.time_utc_ns), good | tags.timed, zoned | (tags.timed & ~good)
