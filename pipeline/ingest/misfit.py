@@ -75,13 +75,19 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     usual = int(kinds[np.argmax(often)])
     at = np.flatnonzero(count == usual)
     first, last = int(at[0]), int(at[-1])
+    to_the_end = last >= n - 1 - _SHARE * n
     where = ""
-    if at.size >= _DENSE * (last - first + 1) and first:
-        until = "on" if last >= n - 1 - _SHARE * n else f"to {_place(layout.rows, last)}"
+    if at.size >= _DENSE * (last - first + 1) and not (first == 0 and to_the_end):
+        until = "on" if to_the_end else f"to {_place(layout.rows, last)}"
         where = f", from {_place(layout.rows, first)} {until}"
         step = (
-            "Columns were added or taken away there: cut the log before that row and ingest both parts, each with the "
+            "Columns were added or taken away there: cut the log at these rows and ingest its parts, each with the "
             "line that names its columns."
+        )
+    elif 2 * wrong.size <= n:
+        step = (
+            "Look at them with `kempf logs rejected`: they are damaged, of another kind, or have a text with a "
+            "separator that does not stand between quotation marks."
         )
     elif layout.separator == "," and usual > width + 1:
         step = (
@@ -97,7 +103,8 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
         layout.separator, f" parted by {layout.separator!r}"
     )
-    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}; {expected}."
+    others = f", and {wrong.size - at.size} have another number" if wrong.size > at.size else ""
+    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}{others}; {expected}."
     return Misfit(found, step, wrong.size)
 
 
