@@ -301,7 +301,9 @@ def test_rows_with_another_number_of_cells_are_reported_with_both_numbers(more, 
     ("text", "time", "advice"),
     [
         ("03/05/2025 06:00:0{}.638 AM", {"date_form": "dd/mm/yyyy"}, "without AM and PM"),
-        ("03/05/2025 06:00:0{}", {}, "`date_form`"),
+        ("03/05/2025 06:00:0{}", {}, "The date is no yyyy-mm-dd"),
+        ("3.5.2025 06:00:0{} UTC", {}, "The date is no yyyy-mm-dd"),
+        ("03/05/2025 06:00:0{} AM", {}, "The date is no yyyy-mm-dd"),
         ("06:00:0{}.638", {}, "date: DATE"),
         ("4578{}.250007384", {}, "its `unit`"),
         ("2025-05-03 06:00:0{}:638", {}, "a point before the decimals of a second"),
@@ -317,6 +319,24 @@ def test_times_that_cannot_be_read_are_quoted_with_their_column_and_the_forms_th
     assert f"{text.format(5)!r} in the column 'utc' of row 5 (line 6)" in error.value.message
     assert "The time of all 8 rows cannot be read" in error.value.message
     assert advice in error.value.next_step and "2025-05-03T06:00:00.5Z" in error.value.next_step
+
+
+def test_advice_on_a_time_is_about_what_is_wrong_with_it():
+    with pytest.raises(DataRejected) as error:
+        read("utc,sog,hdg\n3.5.2025 06:00:01 UTC,1,2\n")
+    assert "zone" not in error.value.next_step and "clock" not in error.value.next_step
+    text = "day,utc,sog,hdg\n" + "".join(f"3.5.2025,06:00:0{k},1,2\n" for k in range(3))
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"date": "day", "time": "utc"}))
+    assert "'3.5.2025' in the column 'day' and '06:00:01' in the column 'utc' of row 2 (line 3)" in error.value.message
+    assert error.value.next_step.startswith("The date is no yyyy-mm-dd")
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"date": "day", "time": "utc", "date_form": "dd/mm/yyyy"}))
+    assert "cannot be read with `date_form: dd/mm/yyyy`" in error.value.message
+    assert error.value.next_step.startswith("Times are read as")
+    with pytest.raises(DataRejected) as error:
+        read(text.replace(",1,2", " AM,1,2"), profile(None, {"date": "day", "time": "utc", "date_form": "dd.mm.yyyy"}))
+    assert error.value.next_step.startswith("Export the log with a 24-hour clock")
 
 
 def test_many_times_that_cannot_be_read_are_noted_and_a_few_are_not():
