@@ -28,17 +28,19 @@ _FORMS = (
     "stand in two columns; as a number with `unit`. See docs/profile.md."
 )
 
-#: What to do about a time, by how it is written; the first that fits.
-_ADVICE = (
+#: What to do about a time of day, by how it is written, and about a column that says nothing but this.
+_ON_CLOCKS = (
     (r"(?i)\d ?[ap]\.?m\.?$", "Export the log with a 24-hour clock, without AM and PM."),
     (
         r"\d:\d\d:\d\d:\d+",
         "Write a point before the decimals of a second, in a copy of the log or in the settings of its logger.",
     ),
     (
-        r"\d:\d\d(:\d\d)?[.,\d]* ?[A-Za-z]{2,5}$",
+        r"\d:\d\d(:\d\d)?[.,\d]* ?(?!UTC$|[AaPp][Mm]$)[A-Za-z]{2,5}$",
         "Write the zone as Z, UTC or its offset, such as +02:00: abbreviations of zones are ambiguous.",
     ),
+)
+_ON_LONE_COLUMNS = (
     (
         r"^\d{1,2}:\d\d(:\d\d)?[.,\d]*\S*$",
         "This is a time of day: name the column of its date, as `time: {date: DATE, time: TIME}`, or write the date "
@@ -49,11 +51,9 @@ _ADVICE = (
         "This is a number: write its `unit` (s, ms, us or ns) into the source's time and, unless it counts from 1970, "
         "its `start`. Days, as spreadsheets count them, are none of these: export them as dates.",
     ),
-    (
-        r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ]\d{1,2}[-./ ]\d{1,4}(?!\d)",
-        "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`.",
-    ),
 )
+_OTHER_DATE = r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ]\d{1,2}[-./ ]\d{1,4}(?!\d)"
+_DATE_ADVICE = "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`."
 
 
 def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
@@ -75,13 +75,19 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     usual = int(kinds[np.argmax(often)])
     at = np.flatnonzero(count == usual)
     first, last = int(at[0]), int(at[-1])
+    to_the_end = last >= n - 1 - _SHARE * n
     where = ""
-    if at.size >= _DENSE * (last - first + 1) and first:
-        until = "on" if last >= n - 1 - _SHARE * n else f"to {_place(layout.rows, last)}"
+    if at.size >= _DENSE * (last - first + 1) and not (first == 0 and to_the_end):
+        until = "on" if to_the_end else f"to {_place(layout.rows, last)}"
         where = f", from {_place(layout.rows, first)} {until}"
         step = (
-            "Columns were added or taken away there: cut the log before that row and ingest both parts, each with the "
+            "Columns were added or taken away there: cut the log at these rows and ingest its parts, each with the "
             "line that names its columns."
+        )
+    elif 2 * wrong.size <= n:
+        step = (
+            "Look at them with `kempf logs rejected`: they are damaged, of another kind, or have a text with a "
+            "separator that does not stand between quotation marks."
         )
     elif layout.separator == "," and usual > width + 1:
         step = (
@@ -97,7 +103,8 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
         layout.separator, f" parted by {layout.separator!r}"
     )
-    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}; {expected}."
+    others = f", and {wrong.size - at.size} have another number" if wrong.size > at.size else ""
+    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}{others}; {expected}."
     return Misfit(found, step, wrong.size)
 
 
@@ -133,10 +140,18 @@ def times_amiss(
         f"The time of {_of_all(unread.size, len(rows)).lower()} rows cannot be read{said}, such as {quoted} of "
         f"{_place(rows, one)}."
     )
-    advice = [] if len(shown) > 1 else [step for form, step in _ADVICE if re.search(form, next(iter(shown.values())))]
+    return Misfit(found, " ".join([*_advice(list(shown.values()), column), _FORMS]), unread.size)
+
+
+def _advice(shown: list[str], column: TimeColumn) -> list[str]:
+    """Return what to do about a time that stands in one column or, date and time of day apart, in two."""
     if column.unit is not None:
-        advice = ["This is no number: leave `unit` out of the source's time."]
-    return Misfit(found, " ".join([*advice[:1], _FORMS]), unread.size)
+        return ["This is no number: leave `unit` out of the source's time."] if len(shown) == 1 else []
+    known = _ON_CLOCKS if len(shown) > 1 else (*_ON_CLOCKS, *_ON_LONE_COLUMNS)
+    advice = [step for form, step in known if re.search(form, shown[-1])]
+    if column.date_form is None and re.search(_OTHER_DATE, shown[0]):
+        advice.append(_DATE_ADVICE)
+    return advice
 
 
 def _many(amiss: int, n: int) -> bool:

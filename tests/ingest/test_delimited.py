@@ -301,7 +301,9 @@ def test_rows_with_another_number_of_cells_are_reported_with_both_numbers(more, 
     ("text", "time", "advice"),
     [
         ("03/05/2025 06:00:0{}.638 AM", {"date_form": "dd/mm/yyyy"}, "without AM and PM"),
-        ("03/05/2025 06:00:0{}", {}, "`date_form`"),
+        ("03/05/2025 06:00:0{}", {}, "The date is no yyyy-mm-dd"),
+        ("3.5.2025 06:00:0{} UTC", {}, "The date is no yyyy-mm-dd"),
+        ("03/05/2025 06:00:0{} AM", {}, "The date is no yyyy-mm-dd"),
         ("06:00:0{}.638", {}, "date: DATE"),
         ("4578{}.250007384", {}, "its `unit`"),
         ("2025-05-03 06:00:0{}:638", {}, "a point before the decimals of a second"),
@@ -317,6 +319,24 @@ def test_times_that_cannot_be_read_are_quoted_with_their_column_and_the_forms_th
     assert f"{text.format(5)!r} in the column 'utc' of row 5 (line 6)" in error.value.message
     assert "The time of all 8 rows cannot be read" in error.value.message
     assert advice in error.value.next_step and "2025-05-03T06:00:00.5Z" in error.value.next_step
+
+
+def test_advice_on_a_time_is_about_what_is_wrong_with_it():
+    with pytest.raises(DataRejected) as error:
+        read("utc,sog,hdg\n3.5.2025 06:00:01 UTC,1,2\n")
+    assert "zone" not in error.value.next_step and "clock" not in error.value.next_step
+    text = "day,utc,sog,hdg\n" + "".join(f"3.5.2025,06:00:0{k},1,2\n" for k in range(3))
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"date": "day", "time": "utc"}))
+    assert "'3.5.2025' in the column 'day' and '06:00:01' in the column 'utc' of row 2 (line 3)" in error.value.message
+    assert error.value.next_step.startswith("The date is no yyyy-mm-dd")
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"date": "day", "time": "utc", "date_form": "dd/mm/yyyy"}))
+    assert "cannot be read with `date_form: dd/mm/yyyy`" in error.value.message
+    assert error.value.next_step.startswith("Times are read as")
+    with pytest.raises(DataRejected) as error:
+        read(text.replace(",1,2", " AM,1,2"), profile(None, {"date": "day", "time": "utc", "date_form": "dd.mm.yyyy"}))
+    assert error.value.next_step.startswith("Export the log with a 24-hour clock")
 
 
 def test_many_times_that_cannot_be_read_are_noted_and_a_few_are_not():
@@ -386,3 +406,53 @@ def test_an_archive_is_named_as_one():
     with pytest.raises(DataRejected, match="is a tar archive") as error:
         read_log("log.tar", stream.getvalue(), profile())
     assert error.value.code == "unknown_format"
+
+
+def rows_of(n, begin=0, more=""):
+    return [f"2025-05-03T07:{k // 60:02d}:{k % 60:02d}Z,1,{k % 360}{more}" for k in range(begin, begin + n)]
+
+
+def test_a_column_that_was_added_on_the_way_is_noted_with_the_row_from_which_on():
+    lines = ["utc,sog,hdg", *rows_of(600), "", "utc,sog,hdg,trim", *rows_of(400, 600, ",0.1")]
+    lines[700] = "2025-05-03T07:11:3"
+    readings = read("\n".join(lines))
+    assert readings.tally.by_reason == {"malformed": 401}
+    (note,) = readings.notes
+    assert note.startswith(
+        "400 of 1001 rows have 4 cells parted by ',', from row 601 (line 603) on, and 1 have another number; the "
+        "header has 3. Columns were added"
+    )
+
+
+@pytest.mark.parametrize(
+    ("lines", "found"),
+    [
+        # between two stretches of whole rows
+        (
+            [*rows_of(300), *rows_of(100, 300, ",1"), *rows_of(200, 400)],
+            "100 of 600 rows have 4 cells parted by ',', from row 301 (line 302) to row 400 (line 401)",
+        ),
+        # before a column was taken away
+        (
+            [*rows_of(100, 0, ",1"), *rows_of(200, 100)],
+            "100 of 300 rows have 4 cells parted by ',', from row 1 (line 2) to row 100 (line 101)",
+        ),
+        # here and there
+        (
+            [row + (",1" if k % 10 == 3 else "") for k, row in enumerate(rows_of(600))],
+            "60 of 600 rows have 4 cells parted by ','",
+        ),
+    ],
+)
+def test_a_note_says_which_rows_have_another_number_of_cells(lines, found):
+    readings = read("\n".join(["utc,sog,hdg", *lines]))
+    (note,) = readings.notes
+    assert note.startswith(f"{found}; the header has 3.")
+    assert readings.tally.records_read == len(lines)
+
+
+def test_a_few_damaged_rows_are_counted_and_not_noted():
+    lines = rows_of(3000)
+    lines[100:1100:50] = [row + ",7" for row in lines[100:1100:50]]
+    readings = read("\n".join(["utc,sog,hdg", *lines]))
+    assert readings.tally.by_reason == {"malformed": 20} and readings.notes == ()
