@@ -16,6 +16,7 @@ from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.refused import by_channel, count
 from kempf.pipeline.channels.doctor.verdict import as_content
 from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.pipeline.channels.there_and_back import counted
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import logs, readings, vessels
 from kempf.warehouse.store import Warehouse
@@ -30,7 +31,7 @@ class ExaminedLog:
     #: The channels as they came.
     log: Log
     examination: Examination
-    #: The same as JSON content, with the profile lines.
+    #: The same as JSON content, with the profile lines and, as ``left_out``, what it did not look at, in words.
     content: dict[str, Any]
 
 
@@ -56,7 +57,9 @@ def examine_instruments(
     beyond = by_channel(refused, instruments.sources)
     log = Log.of(instruments, profile.length_m, profile.trial_speed_m_s, units, beyond)
     examination = examine(log)
-    return ExaminedLog(file_name, log_format, log, examination, as_content(examination, known, log_format))
+    left_out = [counted(name, at.size) for name, at in instruments.left_out.items()]
+    content = {**as_content(examination, known, log_format), "left_out": left_out}
+    return ExaminedLog(file_name, log_format, log, examination, content)
 
 
 def examine_file(path: Path, profile: VesselProfile) -> ExaminedLog:

@@ -7,6 +7,7 @@ here, so that later rooms know one form only.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 import polars as pl
@@ -15,6 +16,7 @@ from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.holds import find_held
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.pipeline.channels.there_and_back import LEAPING, leaps, said
 from kempf.schemas.channels import CHANNELS
 
 #: channels that one instrument measures at one instant, so that they share their rows
@@ -51,6 +53,9 @@ class Instruments:
     #: Standard error, s, of the instants of a channel that its log repeats in several rows, see
     #: `kempf.pipeline.channels.holds.Held`.
     instant_std_s: dict[str, float] = field(default_factory=dict)
+    #: Instants, UTC ns, of the readings of a channel that were left out, see
+    #: `kempf.pipeline.channels.there_and_back.leaps`.
+    left_out: dict[str, Nanoseconds] = field(default_factory=dict)
 
     def get(self, channel: str) -> Series | None:
         """Return the series of a channel, or None where the log lacks it."""
@@ -94,11 +99,29 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         sources |= dict.fromkeys(channels, source)
         if std_s > 0.0:
             unsure |= dict.fromkeys(channels, std_s)
-    notes = [*named_gaps(series), *notes]
+    gaps, leaping = named_gaps(series), list[str]()
+    left_out = _leave_out_leaps(series, leaping)
+    notes = [*gaps, *leaping, *notes]
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)
-    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure)
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure, left_out)
+
+
+def _leave_out_leaps(series: dict[str, Series], notes: list[str]) -> dict[str, Nanoseconds]:
+    """Take the readings that leap away and back out of the channels, and return their instants."""
+    left_out = {}
+    for name in LEAPING:
+        whole = series.get(name)
+        if whole is None or not (found := leaps(whole)).any():
+            continue
+        notes.append(said(name, whole, found))
+        left_out[name] = whole.time_utc_ns[found]
+        rest = Series(whole.time_utc_ns[~found], whole.value[~found])
+        # a rudder is known between its readings, and two that are missing would count as a gap
+        bridged = name == "rudder_angle"
+        series[name] = rest.with_points(left_out[name], rest.at(left_out[name], inf)) if bridged else rest
+    return left_out
 
 
 def _columns(group: tuple[str, ...]) -> list[str]:

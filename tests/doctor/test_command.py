@@ -93,3 +93,16 @@ def test_an_examination_is_kept_once(folder: Path) -> None:
     assert examinations.replace(place, [one])
     assert not examinations.replace(place, [one])
     assert examinations.of_ingests(place, ["i" * 16, "none"]) == {"i" * 16: one}
+
+
+def test_a_dropout_of_the_rate_of_turn_is_left_out_and_accuses_nothing(folder: Path) -> None:
+    lines = (folder / "made.csv").read_text(encoding="utf-8").splitlines()
+    column = lines[0].split(",").index("rot")
+    cells = lines[len(lines) // 2].split(",")
+    lines[len(lines) // 2] = ",".join([*cells[:column], "-999", *cells[column + 1 :]])
+    (folder / "made.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    asked = ("doctor", folder / "made.csv", "--profile", folder / "right.yaml")
+    said = "1 reading of yaw_rate left out: it leaps away and back as no ship turns"
+    content = kempf(*asked, "--json").json
+    assert (content["verdict"], content["left_out"]) == ("clean", [said])
+    assert said in kempf(*asked).out

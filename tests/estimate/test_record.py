@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -211,3 +212,14 @@ def test_what_lateness_takes_is_the_difference_of_two_records(monkeypatch: pytes
     np.testing.assert_allclose(by_late[seen], means[seen], atol=1e-6)
     monkeypatch.undo()
     assert make_record(LOG, START, END).lateral_by_late is None
+
+
+def test_readings_that_were_left_out_are_counted_for_the_segment_they_are_in() -> None:
+    at = np.array([START - SECOND_NS, START + SECOND_NS, END - SECOND_NS])
+    log = replace(LOG, left_out={"yaw_rate": at})
+    assert "2 readings of yaw_rate left out: they leap away and back as no ship turns" in (
+        make_record(log, START, END).warnings
+    )
+    assert not any(
+        "leap" in warning for warning in make_record(log, START + 2 * SECOND_NS, END - 2 * SECOND_NS).warnings
+    )

@@ -77,6 +77,8 @@ def print_examination(name: str, content: dict[str, Any], *, everything: bool) -
         click.echo("she does not move: motions are not testable")
     if content["untested"]:
         click.echo(f"cannot be tested with these channels: {', '.join(_untested(content))}")
+    for words in content.get("left_out", ()):
+        click.echo(words)
     for words in content.get("cannot_see", ()):
         click.echo(f"cannot be seen: {words}")
 

@@ -16,6 +16,7 @@ from kempf.pipeline.channels.punctual import Punctual, VelocitySlope, punctual
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import without_noise
+from kempf.pipeline.channels.there_and_back import counted
 from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
 from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way
 from kempf.pipeline.estimate.record.jumps import find_jumps
@@ -54,7 +55,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     """
     as_delivered, on_time = instruments, punctual(instruments, start_utc_ns, end_utc_ns)
     instruments = on_time.instruments
-    warnings: list[str] = [*on_time.said]
+    warnings: list[str] = [*on_time.said, *_left_out(as_delivered, start_utc_ns, end_utc_ns)]
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
     rudder = _need(instruments, "rudder_angle", start_utc_ns, end_utc_ns)
     course = _need(instruments, "course_over_ground", start_utc_ns, end_utc_ns)
@@ -162,6 +163,14 @@ def _window(instruments: Instruments, start_ns: int, end_ns: int) -> Log:
     """Return what the log itself has of a segment, for the channel doctor."""
     own = {name: _cut(instruments, name, start_ns, end_ns) for name in EXAMINED if name not in instruments.derived}
     return Log({name: series for name, series in own.items() if series is not None})
+
+
+def _left_out(instruments: Instruments, start_ns: int, end_ns: int) -> list[str]:
+    """Return what to warn of where readings of the segment leap away and back, and were left out."""
+    counts = {
+        name: int(np.count_nonzero((at >= start_ns) & (at <= end_ns))) for name, at in instruments.left_out.items()
+    }
+    return [counted(name, count) for name, count in counts.items() if count]
 
 
 def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series:
