@@ -7,6 +7,7 @@ here, so that later rooms know one form only.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 
 import numpy as np
 import polars as pl
@@ -107,10 +108,15 @@ def _leave_out_leaps(series: dict[str, Series], notes: list[str]) -> dict[str, N
     """Take the readings that leap away and back out of the channels, and return their instants."""
     left_out = {}
     for name in LEAPING:
-        if name in series and (found := leaps(series[name])).any():
-            notes.append(said(name, series[name], found))
-            left_out[name] = series[name].time_utc_ns[found]
-            series[name] = Series(series[name].time_utc_ns[~found], series[name].value[~found])
+        whole = series.get(name)
+        if whole is None or not (found := leaps(whole)).any():
+            continue
+        notes.append(said(name, whole, found))
+        left_out[name] = whole.time_utc_ns[found]
+        rest = Series(whole.time_utc_ns[~found], whole.value[~found])
+        # a rudder is known between its readings, and two that are missing would count as a gap
+        bridged = name == "rudder_angle"
+        series[name] = rest.with_points(left_out[name], rest.at(left_out[name], inf)) if bridged else rest
     return left_out
 
 

@@ -1,4 +1,4 @@
-"""Readings that leap away and are back a reading or two later, as no ship turns: dropouts of a sensor."""
+"""Readings that leap away and are back a reading or two later, as nothing moves: dropouts of a sensor."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _BRIEF_S = 10.0
 #: times the farthest that the rest of the channel goes from one reading to the next, and robust standard deviations
 _FARTHER, _SPREADS = 4.0, 8.0
 #: the channels of which leaps are looked for, and what cannot have made them
-LEAPING = {"yaw_rate": "no ship turns"}
+LEAPING = {"yaw_rate": "no ship turns", "rudder_angle": "no steering gear moves"}
 
 
 def leaps(series: Series) -> Mask:
@@ -54,7 +54,10 @@ def leaps(series: Series) -> Mask:
         return found
     followed = _running_median(series.value)
     away = np.abs(series.value[_BESIDE:-_BESIDE] - followed)
-    farthest = _FARTHER * float(np.max(np.abs(np.diff(followed)), initial=0.0))
+    gone = np.abs(np.diff(followed))
+    # beside a leap the median makes up for what it missed of a motion: no step of the channel itself
+    own = np.maximum(away[1:], away[:-1]) <= gone
+    farthest = _FARTHER * float(np.max(gone, initial=0.0, where=own))
     if farthest == 0.0 or farthest > float(np.ptp(followed)):
         return found
     limit = max(farthest, _SPREADS * 1.4826 * float(np.median(away)))

@@ -83,3 +83,63 @@ def test_the_log_says_how_many_were_left_out():
         "2 readings of yaw_rate left out: they leap away and back as no ship turns; the first is -16.65 deg/s at "
         "1970-01-01 00:06:41 UTC"
     )
+
+
+def steering(period_s=0.5, rate_deg_s=5.0, noise=0.1, resolution=0.0):
+    """A 20/20 zigzag of a steering gear that goes over every 100 s, deg."""
+    time = np.arange(0.0, 800.0, period_s)
+    corners = np.arange(50.0, 800.0, 100.0)
+    at, angle = [0.0], [0.0]
+    for k, corner in enumerate(corners):
+        to = 20.0 if k % 2 == 0 else -20.0
+        at += [corner, corner + abs(to - angle[-1]) / rate_deg_s]
+        angle += [angle[-1], to]
+    shown = np.interp(time, at, angle) + noise * np.random.default_rng(RNG_SEED).standard_normal(time.size)
+    return np.round(shown / resolution) * resolution if resolution else shown
+
+
+@pytest.mark.parametrize("failed", [-45.0, -88.8, 60.0])
+@pytest.mark.parametrize("at", [[213, 214], [213, 214, 262, 263, 515, 1301, 1302]])
+def test_a_broken_loop_of_the_rudder_is_found(failed, at):
+    angle = steering()
+    angle[at] = failed
+    assert np.flatnonzero(leaps(series(np.deg2rad(angle), 0.5))).tolist() == at
+
+
+def orders(held_readings):
+    """An order that jumps and stays, deg."""
+    return np.repeat(np.random.default_rng(RNG_SEED).choice([-20.0, -10.0, 0.0, 10.0, 20.0], 200), held_readings)
+
+
+@pytest.mark.parametrize(
+    ("angle", "period_s"),
+    [
+        (steering(), 0.5),
+        (steering(resolution=1.0), 0.5),
+        (steering(period_s=0.1), 0.1),
+        (steering(period_s=2.0), 2.0),
+        (steering(period_s=3.0), 3.0),
+        (steering(period_s=10.0), 10.0),
+        (steering(rate_deg_s=1000.0), 0.5),
+        (orders(1), 1.0),
+        (orders(2), 1.0),
+        (orders(20), 1.0),
+        # one order that is taken back at once
+        (np.where(np.isin(np.arange(4000), [1005, 1006]), 35.0, orders(20)), 1.0),
+    ],
+)
+def test_no_sound_rudder_is_found(angle, period_s):
+    assert not leaps(series(np.deg2rad(angle), period_s)).any()
+
+
+def test_a_rudder_is_bridged_where_readings_are_left_out():
+    angle = np.deg2rad(steering(noise=0.0))
+    angle[[213, 214]] = np.deg2rad(-45.0)
+    made = series(angle, 0.5)
+    frame = pl.DataFrame({"time_utc_ns": made.time_utc_ns, "source": "row", "rudder_angle_rad": made.value})
+    found = from_readings(frame)
+    rudder = found.series["rudder_angle"]
+    assert rudder.time_utc_ns.tolist() == made.time_utc_ns.tolist()
+    assert np.allclose(np.rad2deg(rudder.value[[213, 214]]), 20.0)
+    assert found.left_out["rudder_angle"].tolist() == made.time_utc_ns[[213, 214]].tolist()
+    assert any(note.startswith("2 readings of rudder_angle left out") for note in found.notes)
