@@ -22,6 +22,7 @@ SOURCES = [
         "estimate/maximum_likelihood",
         "estimate/no_log/companions",
         "channels/doctor/verdict",
+        "channels/there_and_back",
     )
 ]
 CODE = re.compile(r'DataRejected\(\s*"(\w+)"(?: if \w+ else "(\w+)")?')
