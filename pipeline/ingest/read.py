@@ -25,7 +25,14 @@ MOST_TEXT_BYTES = 2 << 30
 #: Notes that a refusal repeats, at most.
 _NOTES = 3
 #: Reasons of which a sound log may have many, and share of refused records from which a note says so.
-_ORDINARY, _MOSTLY = ("no_channel", "duplicate", "same_instant", "void"), 0.5
+_ORDINARY, _MANY = ("no_channel", "duplicate", "void"), 0.1
+#: What else to look for where many records are refused for a reason.
+_LOOK_FOR = {
+    "clock_back": " Do its records run backwards in time, or stand in another order than that of their times?",
+    "same_instant": " Records of one source share an instant and differ: the times are coarser than the readings. "
+    "Where the log has finer ones, such as the `publish_time` or a field of MCAP messages, name them as the column of "
+    "`time`.",
+}
 #: Characters of a record that it shows.
 _CUT = 160
 
@@ -144,12 +151,13 @@ class _Summary:
         doubts = [f"{misfit.found} {misfit.next_step}" for misfit in misfits]
         refused = {reason: n for reason, n in self.tally.by_reason.items() if reason not in _ORDINARY}
         most = max(sorted(refused), key=lambda reason: refused[reason], default="")
-        if not most or refused[most] <= _MOSTLY * self.tally.records_read or (most == "malformed" and misfits):
+        share = refused[most] / self.tally.records_read if most else 0.0
+        if share <= _MANY or (most == "malformed" and misfits):
             return doubts
-        why = " Do its rows run backwards in time?" if most == "clock_back" else ""
+        much = "most" if share > 0.5 else f"{100.0 * share:.0f} %"
         return [
-            f"{refused[most]} refusals, most of the log, are {most}: see whether the profile fits it, and `kempf logs "
-            f"rejected`.{why}",
+            f"{refused[most]} refusals, {much} of the log, are {most}: see whether the profile fits it, and `kempf "
+            f"logs rejected`.{_LOOK_FOR.get(most, '')}",
             *doubts,
         ]
 

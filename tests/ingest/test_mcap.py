@@ -77,6 +77,15 @@ def test_publish_time_on_request():
         read(write(plain(1)), profile(time={"column": "utc"}))
 
 
+def test_times_coarser_than_the_messages_are_named_with_where_finer_ones_may_be():
+    # written once a second by the recorder
+    readings = read(write([(topic, float(int(seconds)), payload) for topic, seconds, payload in plain()]))
+    refused = readings.tally.by_reason["same_instant"]
+    assert refused > 100 and readings.notes[0].startswith(f"{refused} refusals, most of the log, are same_instant")
+    assert "`publish_time`" in readings.notes[0]
+    assert read(write(plain())).notes == ()
+
+
 def test_broken_and_odd_messages_cost_only_themselves():
     payloads = [
         {"heading": 1.0},
