@@ -59,6 +59,20 @@ def test_a_clock_that_is_set_or_drifts_is_followed() -> None:
     assert np.abs(late(readings)).max() < 0.2  # the ends of a median of half a minute
 
 
+def test_what_a_receiver_takes_to_send_turns_no_time_back() -> None:
+    waits = np.random.default_rng(4).uniform(0.0, 0.4, 400)
+    # a compass fifty times a second, and fixes that wait now and then
+    lines = [(k + waits[k], rmc(when)) for k, when in enumerate(instants(400))]
+    lines += [(k / 50.0, sentence(f"HEHDT,{k % 3600 / 10.0:.1f},T")) for k in range(50 * 400)]
+    at = [f"{START + timedelta(seconds=second + 5.0):%Y-%m-%dT%H:%M:%S.%f}Z {words}" for second, words in sorted(lines)]
+    readings = read(*at)
+    assert readings.tally.records_rejected == 0
+    headings = readings.frame.filter(readings.frame["heading_rad"].is_not_null())["time_utc_ns"].to_numpy()
+    off = (headings - int(START.timestamp()) * 10**9) / 1e9 - np.arange(headings.size) / 50.0
+    # the receiver's own delay stays, 0.2 s in the middle
+    assert np.abs(off + 0.2).max() < 0.1
+
+
 def test_stamps_of_whole_seconds_are_spread_over_the_second() -> None:
     readings = read(*log(stamp=lambda when: f"{when:%Y-%m-%dT%H:%M:%S}Z"))
     assert readings.tally.records_rejected == 0 and "whole seconds" in readings.notes[0]

@@ -158,7 +158,8 @@ def test_a_stamp_that_cannot_be_read_makes_the_line_malformed():
 def test_a_logger_clock_that_is_off_is_reported():
     readings = read(stamped(RMC, at="2025-05-03T08:47:01.150Z"))
     assert readings.notes == (
-        "The logger's clock is 3600.000 s ahead of the receiver's UTC (median): 1 stamps were put right by it.",
+        "The logger's stamps are 3600.000 s ahead of the receiver's UTC (median), by 1 of its fixes: too few to put "
+        "them right.",
     )
     assert readings.frame["time_utc_ns"].to_list() == [ns("2025-05-03T07:47:01.150+00:00")]
 

@@ -24,6 +24,8 @@ _PAUSE = 3
 _LATEST_NS, _EARLIEST_NS = SECOND_NS, -SECOND_NS // 10
 #: A receiver that sends so late, or a clock that is so far off, is worth a note, ns.
 _WORTH_NS = SECOND_NS // 2
+#: Fixes that can put a clock right: one may have waited.
+_FEWEST = 5
 #: Fixes on either side over which the lead of the stamps is a median, and fixes that are worked on at a time.
 _BESIDE, _MANY = 15, 100_000
 
@@ -136,26 +138,31 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     ahead = "ahead of" if usual > 0 else "behind"
     much = f"{abs(usual) / SECOND_NS:.3f} s" if abs(usual) < DAY_NS else f"{abs(usual) / DAY_NS:.2f} days"
     size = f"{much} {ahead} the receiver's UTC (median)"
+    if at.size < _FEWEST:
+        few = f"The logger's stamps are {size}, by {at.size} of its fixes: too few to put them right."
+        return LoggerTimes(stamp_ns, () if _EARLIEST_NS <= usual <= _WORTH_NS else (few,))
     if lead.min() >= _EARLIEST_NS and lead.max() <= _LATEST_NS:
         late = f"The logger's stamps are {size}: its clock may be off, or the receiver sends so late. They were kept."
         return LoggerTimes(stamp_ns, (late,) if usual > _WORTH_NS else ())
     (record,) = np.nonzero(stamp_ns != NO_TIME)
     before = np.clip(np.searchsorted(at, record, side="right") - 1, 0, at.size - 1)
     after = np.clip(np.searchsorted(at, record), 0, at.size - 1)
-    # where the clock is set between two fixes, a line has the lead of that fix with which it lies between them
     by_before, by_after = stamp_ns[record] - lead[before], stamp_ns[record] - lead[after]
-    off = [
+    off_before, off_after = (
         np.maximum(np.maximum(own[before] - by, by - own[after]), 0) for by in (by_before, by_after)
-    ]  # fmt: skip
+    )
+    gradual = stamp_ns[record] - lead[0] - np.rint(np.interp(record, at, lead - lead[0])).astype(np.int64)
+    # where the clock is set between two fixes, a line has the lead of that fix with which it lies between them
+    is_set = np.abs(lead[after] - lead[before]) > _WORTH_NS
     result = stamp_ns.copy()
-    result[record] = np.where(off[0] <= off[1], by_before, by_after)
+    result[record] = np.where(is_set, np.where(off_before <= off_after, by_before, by_after), gradual)
     moved = int(lead.max() - lead.min())
     between = f", from {lead.min() / SECOND_NS:.3f} to {lead.max() / SECOND_NS:.3f} s" if moved > _WORTH_NS else ""
     return LoggerTimes(result, (f"The logger's clock is {size}{between}: {record.size} stamps were put right by it.",))
 
 
 def _running_median(value: Nanoseconds) -> Nanoseconds:
-    """Return the median of each value and those beside it; at the ends fewer."""
+    """Return the median of each value and those beside it, reflected at the ends; of few, that of all."""
     if value.size <= 2 * _BESIDE:
         return np.full(value.size, np.sort(value)[value.size // 2])
     padded = np.concatenate([value[_BESIDE:0:-1], value, value[-2 : -_BESIDE - 2 : -1]])
