@@ -31,7 +31,9 @@ def named_gaps(series: Mapping[str, Series]) -> list[str]:
     sampled = {name: one for name, one in series.items() if len(one) > 1}
     if not sampled:
         return []
-    together = np.unique(np.concatenate([one.time_utc_ns for one in sampled.values()]))
+    # channels of one instrument share their instants
+    instants = {id(one.time_utc_ns): one.time_utc_ns for one in sampled.values()}
+    together = np.sort(np.concatenate(list(instants.values())), kind="stable")
     silent = _gaps(together, min(one.period_s for one in sampled.values()))
     alone: dict[bytes, list[str]] = {}
     for name, one in sampled.items():

@@ -18,6 +18,7 @@ from kempf.pipeline.channels.holds import find_held
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.channels.there_and_back import LEAPING, leaps, said
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.nmea import SENTENCES
 
 #: channels that one instrument measures at one instant, so that they share their rows
 _TOGETHER: tuple[tuple[str, ...], ...] = (
@@ -113,7 +114,7 @@ def _leave_out_leaps(series: dict[str, Series], notes: list[str]) -> dict[str, N
     left_out = {}
     for name in LEAPING:
         whole = series.get(name)
-        if whole is None or not (found := leaps(whole)).any():
+        if whole is None or not (found := leaps(whole, name)).any():
             continue
         notes.append(said(name, whole, found))
         left_out[name] = whole.time_utc_ns[found]
@@ -160,10 +161,10 @@ def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) ->
 def _remoteness(source: str) -> tuple[bool, bool, bool]:
     """Say how far a source is from the instrument: a magnetic compass, a repeater, a sentence without its own time.
 
-    Only an NMEA address of five letters says so; topics and columns are as near as any.
+    Only the address of an NMEA sentence says so; topics and columns are as near as any.
     """
     talker, sentence = source[:2], source[2:]
-    if len(source) != 5:
+    if sentence not in SENTENCES or not talker.isupper():
         return False, False, False
     return sentence in _MAGNETIC, talker in _REPEATS, sentence not in _OWN_CLOCK
 

@@ -18,9 +18,12 @@ _BRIEF_S = 10.0
 _FARTHER, _SPREADS = 4.0, 8.0
 #: the channels of which leaps are looked for, and what cannot have made them
 LEAPING = {"yaw_rate": "no ship turns", "rudder_angle": "no steering gear moves"}
+#: what does go away and back in a log without hard manoeuvres: rad and rad a second for a rudder, which SOLAS II-1/29
+#: wants to move by 2.3 deg/s and faster ones move by four times that, rad/s for a ship
+_GEAR_RAD, _GEAR_RAD_S, _TURN_RAD_S = np.deg2rad(5.0), np.deg2rad(10.0), np.deg2rad(1.0)
 
 
-def leaps(series: Series) -> Mask:
+def leaps(series: Series, name: str) -> Mask:
     """Find readings that are away and back as the rest of the channel shows that it cannot be.
 
     What the channel follows is the running median of five readings, which a leap of one or two leaves alone. The
@@ -31,7 +34,9 @@ def leaps(series: Series) -> Mask:
     Parameters
     ----------
     series : Series
-        Of one of `LEAPING`.
+        The channel.
+    name : str
+        Which one, of `LEAPING`.
 
     Returns
     -------
@@ -46,7 +51,7 @@ def leaps(series: Series) -> Mask:
     >>> time = np.arange(300)
     >>> rate = np.sin(time / 20.0)
     >>> rate[[100, 101, 222]] = -16.6
-    >>> np.flatnonzero(leaps(Series(time * 1_000_000_000, rate))).tolist()
+    >>> np.flatnonzero(leaps(Series(time * 1_000_000_000, rate), "yaw_rate")).tolist()
     [100, 101, 222]
     """
     found = np.zeros(len(series), dtype=np.bool_)
@@ -60,7 +65,8 @@ def leaps(series: Series) -> Mask:
     farthest = _FARTHER * float(np.max(gone, initial=0.0, where=own))
     if farthest == 0.0 or farthest > float(np.ptp(followed)):
         return found
-    limit = max(farthest, _SPREADS * 1.4826 * float(np.median(away)))
+    usual = _TURN_RAD_S if name == "yaw_rate" else max(_GEAR_RAD, _GEAR_RAD_S * series.period_s)
+    limit = max(farthest, _SPREADS * 1.4826 * float(np.median(away)), usual)
     at = np.flatnonzero(away > limit) + _BESIDE
     # across a gap anything may have happened
     step = np.diff(series.time_utc_ns)

@@ -36,13 +36,19 @@ def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
     """
     if len(steps[0].fit.runs) + len(ladder.held) < _FEWEST:
         return steps
+    seen = set[frozenset[str]]()
     while ladder.shooting is not None and len(steps) <= ladder.settings.most_steps:
         ladder.listener.begins(f"step {len(steps)}: predicting one leg ahead")
         more = _one_more(ladder, ladder.shooting, steps) or _several_more(ladder, ladder.shooting, steps)
         if not more:
             break
         idle = _idle(ladder, more)
-        steps = more if idle is None else ladder.without(idle, more)
+        more = more if idle is None else ladder.without(idle, more)
+        names = frozenset(step.added.name for step in more if step.added is not None)
+        if names in seen:
+            break  # what was taken out would be put in again
+        seen.add(names)
+        steps = more
         ladder.probe = steps[-1].fit
     return steps
 

@@ -29,7 +29,7 @@ def turning(n=800, period_s=1.0, noise=0.02):
 def test_dropouts_of_the_rate_of_turn_are_found(at):
     rate = turning()
     rate[at] = DROPOUT
-    assert np.flatnonzero(leaps(series(rate))).tolist() == at
+    assert np.flatnonzero(leaps(series(rate), "yaw_rate")).tolist() == at
 
 
 @pytest.mark.parametrize(
@@ -50,16 +50,25 @@ def test_dropouts_of_the_rate_of_turn_are_found(at):
     ],
 )
 def test_nothing_sound_is_found(rate):
-    assert not leaps(series(rate)).any()
+    assert not leaps(series(rate), "yaw_rate").any()
 
 
 def test_a_log_that_is_sailed_straight_and_turns_once_keeps_its_turn():
     rate = np.zeros(500)
     rate[250:252] = 0.02
-    assert not leaps(series(rate, 30.0)).any()
+    assert not leaps(series(rate, 30.0), "yaw_rate").any()
     drift = 1e-3 * np.sin(np.arange(500) / 80.0)
-    assert not leaps(series(np.where(np.arange(500) == 250, 0.02, drift), 30.0)).any()
-    assert leaps(series(np.where(np.arange(500) == 250, 0.02, drift), 1.0)).any()
+    assert not leaps(series(np.where(np.arange(500) == 250, 0.02, drift), 30.0), "yaw_rate").any()
+    assert leaps(series(np.where(np.arange(500) == 250, 0.02, drift), 1.0), "yaw_rate").any()
+
+
+def test_small_movements_of_a_rudder_that_is_hardly_put_over_are_sound():
+    # a helmsman's touch of 2 deg in a log that holds no more than 0.3 deg else
+    rudder = np.deg2rad(0.3 * np.sin(np.arange(600) / 9.0))
+    rudder[[100, 101, 300, 301]] += np.deg2rad(2.0)
+    assert not leaps(series(rudder), "rudder_angle").any()
+    rudder[450] = np.deg2rad(-45.0)
+    assert np.flatnonzero(leaps(series(rudder), "rudder_angle")).tolist() == [450]
 
 
 def test_what_was_sailed_within_a_gap_is_not_judged():
@@ -67,7 +76,7 @@ def test_what_was_sailed_within_a_gap_is_not_judged():
     rate[401] = DROPOUT
     whole = series(rate)
     later = whole.time_utc_ns + np.where(np.arange(rate.size) > 401, 60 * SECOND_NS, 0)
-    assert not leaps(Series(later, rate)).any()
+    assert not leaps(Series(later, rate), "yaw_rate").any()
 
 
 def test_the_log_says_how_many_were_left_out():
@@ -103,7 +112,7 @@ def steering(period_s=0.5, rate_deg_s=5.0, noise=0.1, resolution=0.0):
 def test_a_broken_loop_of_the_rudder_is_found(failed, at):
     angle = steering()
     angle[at] = failed
-    assert np.flatnonzero(leaps(series(np.deg2rad(angle), 0.5))).tolist() == at
+    assert np.flatnonzero(leaps(series(np.deg2rad(angle), 0.5), "rudder_angle")).tolist() == at
 
 
 def orders(held_readings):
@@ -129,7 +138,7 @@ def orders(held_readings):
     ],
 )
 def test_no_sound_rudder_is_found(angle, period_s):
-    assert not leaps(series(np.deg2rad(angle), period_s)).any()
+    assert not leaps(series(np.deg2rad(angle), period_s), "rudder_angle").any()
 
 
 def test_a_rudder_is_bridged_where_readings_are_left_out():

@@ -86,9 +86,93 @@ def test_what_comes_in_bursts_is_spread_over_the_time_before() -> None:
         return f"{START + timedelta(seconds=np.ceil(second - 0.5) + 0.5):%Y-%m-%dT%H:%M:%S.%f}Z"
 
     readings = read(*log(stamp=burst))
-    assert readings.tally.records_rejected == 0 and "every 1 s (median)" in readings.notes[0]
+    assert readings.tally.records_rejected == 0 and "in bursts, every 1 s (median)" in readings.notes[0]
     # in the first and the last burst there are fewer
     assert np.abs(late(readings)[RATE_HZ:-RATE_HZ]).max() < 0.2
+
+
+def bursty(writing_s: float, until_s=lambda second, words: np.ceil(second - 0.5) + 0.5) -> list[str]:
+    """The log of a logger that looks at each port once a second, and needs some time to write what came."""
+    lines = []
+    for line in log():
+        when, words = line.split("Z ")
+        second = (datetime.fromisoformat(f"{when}+00:00") - START).total_seconds()
+        until = until_s(second, words)
+        # what came first is written first
+        lines.append((until + writing_s * (second - until + 1.0), words))
+    lines.sort(key=lambda line: line[0])
+    return [f"{START + timedelta(seconds=at):%Y-%m-%dT%H:%M:%S.%f}Z {words}" for at, words in lines]
+
+
+def test_bursts_that_take_milliseconds_to_write_are_bursts() -> None:
+    readings = read(*bursty(0.002))
+    assert readings.tally.records_rejected == 0 and "in bursts, every 1 s (median)" in readings.notes[0]
+    assert np.abs(late(readings)[RATE_HZ:-RATE_HZ]).max() < 0.2
+
+
+def test_every_port_has_bursts_of_its_own() -> None:
+    def looked_at(second: float, words: str) -> float:
+        phase = 0.5 if "HDT" in words else 0.7
+        return float(np.ceil(second - phase) + phase)
+
+    readings = read(*bursty(0.0, looked_at))
+    assert "in bursts, every 1 s (median)" in readings.notes[0]
+    assert np.abs(late(readings)[RATE_HZ:-RATE_HZ]).max() < 0.2
+
+
+def test_lines_written_twice_are_duplicates_and_no_bursts() -> None:
+    readings = read(*(line for once in log() for line in (once, once)))
+    assert readings.notes == () and readings.tally.by_reason == {"duplicate": len(log())}
+    np.testing.assert_allclose(late(readings), 0.03, atol=1e-6)
+
+
+def test_a_log_that_holds_a_stretch_twice_has_no_bursts() -> None:
+    readings = read(*log(), *log())
+    assert not any("bursts" in note or "clock" in note for note in readings.notes[1:])
+    assert readings.tally.records_kept == len(log())
+
+
+def with_fixes(fixes: list[tuple[float, str]], many: int) -> list[str]:
+    """Headings as they should be, and fixes of one's own: arrival after the start, s, and sentence."""
+    arrived = [(k + n / RATE_HZ + 0.03, sentence(f"HEHDT,{k}.{n},T")) for k in range(many) for n in range(RATE_HZ)]
+    lines = sorted([*fixes, *arrived])
+    return [f"{START + timedelta(seconds=second):%Y-%m-%dT%H:%M:%S.%f}Z {words}" for second, words in lines]
+
+
+@pytest.mark.parametrize("ahead_s", [18.0, 1.0])
+def test_a_receiver_that_is_ahead_puts_no_clock_right(ahead_s: float) -> None:
+    fixes = [(k + 0.1, rmc(when)) for k, when in enumerate(instants(120))]
+    fixes += [(k + 0.15, rmc(when + timedelta(seconds=ahead_s), talker="GN")) for k, when in enumerate(instants(120))]
+    readings = read(*with_fixes(fixes, 120))
+    np.testing.assert_allclose(late(readings), 0.03, atol=1e-6)
+    assert any(note.startswith("The clock of GNRMC is") and "ahead of that of GPRMC" in note for note in readings.notes)
+
+
+def test_a_receiver_s_time_that_leaps_is_not_the_logger_s() -> None:
+    # it learns of the leap seconds after 50 s; it says one time for 40 s
+    learns = [(k + 0.1, rmc(when + timedelta(seconds=18 if k < 50 else 0))) for k, when in enumerate(instants(150))]
+    stands = [(k + 0.1, rmc(instants(150)[min(k, 60) if k < 100 else k])) for k in range(150)]
+    for fixes in (learns, stands):
+        readings = read(*with_fixes(fixes, 150))
+        np.testing.assert_allclose(late(readings), 0.03, atol=1e-6)
+        assert any("leaps or stands still" in note for note in readings.notes)
+
+
+def test_a_date_that_is_late_at_midnight_moves_no_stamp() -> None:
+    start = START.replace(hour=23, minute=59, second=0)
+    lines = []
+    for k in range(120):
+        when = start + timedelta(seconds=k)
+        dated = when - timedelta(days=1) if 60 <= k < 80 else when
+        stamped = when + timedelta(seconds=0.1)
+        said = rmc(when).split(",")
+        said[9] = f"{dated:%d%m%y}"
+        lines += [
+            f"{stamped:%Y-%m-%dT%H:%M:%S.%f}Z {sentence(','.join(said)[1:].partition('*')[0])}",
+            f"{when + timedelta(seconds=0.5):%Y-%m-%dT%H:%M:%S.%f}Z {sentence(f'HEHDT,{k}.0,T')}",
+        ]
+    readings = read(*lines)
+    assert readings.tally.records_rejected == 0 and not any("clock" in note for note in readings.notes)
 
 
 def test_stamps_as_they_should_be_are_left_alone() -> None:
@@ -139,3 +223,23 @@ def test_another_receiver_dates_while_the_first_is_silent() -> None:
         lines += [rmc(at)] if k < 30 else []
         lines += [rmc(at, talker="II"), *(sentence(f"HEHDT,{k}.{n},T") for n in range(RATE_HZ))]
     np.testing.assert_allclose(late(read(*lines)), 0.0, atol=1e-6)
+
+
+def test_a_clock_that_differs_dates_nothing_while_the_receiver_is_silent() -> None:
+    when = instants(120)
+    lines = []
+    for k, at in enumerate(when):
+        lines += [rmc(at)] if not 50 <= k < 60 else []
+        lines += [zda(at + timedelta(hours=2), "ZQ"), *(sentence(f"HEHDT,{k}.{n},T") for n in range(RATE_HZ))]
+    readings = read(*lines)
+    assert readings.tally.by_reason == {"no_channel": len(when)}
+    # those behind the last fix share it with those of the gap
+    sound = np.r_[: 49 * RATE_HZ, 60 * RATE_HZ : 120 * RATE_HZ]
+    np.testing.assert_allclose(late(readings)[sound], 0.0, atol=1e-6)
+
+
+def test_addresses_of_damaged_lines_take_no_time() -> None:
+    garbled = [
+        sentence(f"HEHDT,{k}.0,T")[:-2].replace("HEHDT", f"H{k % 10}X{k // 10 % 26:02d}") + "00" for k in range(50)
+    ]
+    assert read(*plain(), *garbled).tally.by_reason["checksum"] == len(garbled)

@@ -353,7 +353,20 @@ def test_a_time_in_front_of_a_sentence_is_read_whatever_is_around_it(front):
 
 @pytest.mark.parametrize(
     "front",
-    ["07:47:01.147;", "03.05.2025 07:47:01.147;", "123456 ", "GPS1 ", "SN1746258421 ", "5746258421 ", "17462584211 "],
+    [
+        *(
+            "07:47:01.147;",
+            "03.05.2025 07:47:01.147;",
+            "123456 ",
+            "GPS1 ",
+            "SN1746258421 ",
+            "5746258421 ",
+            "17462584211 ",
+        ),
+        # zones and halves of the day that would be read as UTC
+        *("2025-05-03 09:47:01.147 UTC+02:00 ", "2025-05-03 09:47:01 GMT+2 ", "2025-05-03T09:47:01.147+2 "),
+        *("2025-05-03 01:47:01 PM ", "2025-05-03 09:47:01 CEST "),
+    ],
 )
 def test_text_in_front_of_the_sentences_that_is_no_time_is_shown(front):
     line = f"{front}{sentence(RMC)}\r\n"

@@ -83,10 +83,14 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     dated = fixed if fixed.any() else times.dated
     if frames.stamped:
         stamps = LoggerTimes(_set_right(frames.stamp_ns, times, notes))
-        if are_coarse(stamps.time_utc_ns):
+        # two listeners that write one file make every stamp come twice
+        if are_coarse(stamps.time_utc_ns) and are_coarse(stamps.time_utc_ns[~_repeats(frames)]):
             stamps = spread(stamps.time_utc_ns, _sources(frames, said, np.zeros(n, dtype=np.bool_)))
-        right = on_utc(stamps.time_utc_ns, times.full, fixes_of_one(frames, dated, stamps.time_utc_ns - times.full))
-        notes += [*stamps.notes, *right.notes]
+        full = _by_stamps(times, stamps.time_utc_ns)
+        dated &= stamps.time_utc_ns != NO_TIME
+        believed, differing = fixes_of_one(frames, dated, stamps.time_utc_ns - full)
+        right = on_utc(stamps.time_utc_ns, full, believed)
+        notes += [*stamps.notes, *differing, *right.notes]
         own = _nearest_day(times, right.time_utc_ns, notes)
         return NmeaClock(np.where(own != NO_TIME, own, right.time_utc_ns), notes)
     speaks, differing = speaking(frames, dated, times.of_day)
@@ -101,6 +105,28 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     return NmeaClock(
         np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
     )
+
+
+def _repeats(frames: Frames) -> Flag:
+    """Return which lines end as the line before does and are as long: they say the same."""
+    buffer, stop = frames.lines.buffer, frames.lines.stop
+    # the two digits of the checksum
+    tail = buffer[np.maximum(stop - 1, 0)].astype(np.int64) << 8 | buffer[np.maximum(stop - 2, 0)]
+    size = frames.body.stop - frames.body.start
+    repeats = np.zeros(len(frames.lines), dtype=np.bool_)
+    repeats[1:] = (np.diff(frames.address) == 0) & (np.diff(size) == 0) & (np.diff(tail) == 0)
+    return repeats
+
+
+def _by_stamps(times: _LineTimes, stamp_ns: Nanoseconds) -> Nanoseconds:
+    """Return the instants that sentences give, dates that are updated late at midnight put right."""
+    both = times.dated & (stamp_ns != NO_TIME)
+    leads = stamp_ns[both] - times.full[both]
+    if leads.size == 0 or np.ptp(leads) < DAY_NS // 2:
+        return times.full
+    lead = np.sort(leads)[leads.size // 2]
+    by_stamps = _nearest_day(times, np.where(stamp_ns != NO_TIME, stamp_ns - lead, NO_TIME), [])
+    return np.where(times.dated, by_stamps, NO_TIME)
 
 
 def _set_right(stamp_ns: Nanoseconds, times: _LineTimes, notes: list[str]) -> Nanoseconds:

@@ -25,9 +25,10 @@ def decode(data: bytes, corrections: Corrections = _NONE, variation_deg: float |
     """Decode an NMEA 0183 log.
 
     A record is a line that is not blank. RMC, ZDA, GGA and GLL have their own time; any other sentence has that of its
-    stamp, or in a log without stamps the time of the latest of those four before it - of the next one behind
-    it, where VTG shows that the receiver sends its fix last. What comes several times between two fixes is spread
-    evenly over the time between them.
+    stamp, on the receiver's UTC (`kempf.pipeline.ingest.nmea.logger_clock`), or in a log without stamps the time of the
+    latest of those four of one receiver before it (`kempf.pipeline.ingest.nmea.receiver`) - of the next one behind it,
+    where VTG shows that the receiver sends its fix last. What comes several times between two fixes is spread evenly
+    over the time between them.
 
     Parameters
     ----------

@@ -10,19 +10,20 @@ from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
-#: Stamps of one source, by which it is judged whether several of its sentences share one.
+#: Stamps of one source, by which it is judged whether several of its sentences come together.
 _LEAST = 20
-#: Share of the stamps that are whole seconds where all are meant to be, and of those that several sentences of a
-#: source share where it is no accident.
+#: Share of the stamps that are whole seconds where all are meant to be, and of the bursts of a source in which it says
+#: several sentences where that is no accident.
 _WHOLE, _SHARED = 0.99, 0.1
-#: Share of the lines that have the stamp of the line before where they come in bursts; several instruments may speak
-#: in one millisecond.
-_BESIDE_EACH_OTHER = 0.5
-#: A stamp waits for so many usual distances of the stamps at most: a longer one is a pause of the log.
-_PAUSE = 3
+#: Lines of one burst follow each other within this, ns, and at least this share of all lines follow another so.
+_TOGETHER_NS, _IN_BURSTS = SECOND_NS // 50, 0.5
+#: Lines by which it is judged whether a log comes in bursts.
+_SAMPLE = 20_000
+#: A burst brings what came since the one before, if that is no longer ago than so many usual distances.
+_USUAL = 1.5
 #: Receivers send a fix up to a second after its instant, and never before; what rounding leaves before it, ns.
 _LATEST_NS, _EARLIEST_NS = SECOND_NS, -SECOND_NS // 10
-#: A receiver that sends so late, or a clock that is so far off, is worth a note, ns.
+#: A receiver that sends so late, or a clock that is so far off or leaps so far, is worth a note, ns.
 _WORTH_NS = SECOND_NS // 2
 #: Fixes that can put a clock right: one may have waited.
 _FEWEST = 5
@@ -41,7 +42,7 @@ class LoggerTimes:
 
 
 def are_coarse(stamp_ns: Nanoseconds) -> bool:
-    """Return whether stamps may be whole seconds or shared by lines that did not come at one instant.
+    """Return whether stamps may be whole seconds, or those of a logger that looks for sentences now and then.
 
     Parameters
     ----------
@@ -51,7 +52,8 @@ def are_coarse(stamp_ns: Nanoseconds) -> bool:
     known = stamp_ns[stamp_ns != NO_TIME]
     if known.size < _LEAST:
         return False
-    return bool(np.mean(known[1:] == known[:-1]) >= _BESIDE_EACH_OTHER) or _whole(known)
+    since = np.diff(known)
+    return _whole(known) or bool(np.mean((since >= 0) & (since < _TOGETHER_NS)) >= _IN_BURSTS)
 
 
 def _whole(stamp_ns: Nanoseconds) -> bool:
@@ -63,8 +65,8 @@ def _whole(stamp_ns: Nanoseconds) -> bool:
 def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
     """Spread the sentences that share a stamp over the time that it stands for.
 
-    A stamp of whole seconds stands for the second that begins with it. One that several sentences of an instrument
-    share, as behind a serial server or a logger that looks once a second, stands for the time since the one before.
+    A stamp of whole seconds stands for the second that begins with it. What comes in bursts, as from a serial server or
+    a logger that looks once a second, came since the burst before.
 
     Parameters
     ----------
@@ -78,41 +80,65 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
         return LoggerTimes(stamp_ns)
     stamp, own = stamp_ns[record], source[record]
     whole = _whole(stamp)
-    order = np.lexsort((record, stamp, own))
-    opens = np.concatenate(([True], (np.diff(own[order]) != 0) | (np.diff(stamp[order]) != 0)))
-    heads = np.flatnonzero(opens)
-    count = np.diff(heads, append=record.size)
-    if not whole and not _in_bursts(own[order][heads], count):
+    # lines that follow each other, and no others: a log may hold one stretch twice
+    begins = np.concatenate(([True], np.abs(np.diff(stamp)) >= (1 if whole else _TOGETHER_NS)))
+    burst, first = np.cumsum(begins), np.flatnonzero(begins)
+    begun = stamp[first][burst - 1]
+    # most logs have none, which their first lines show
+    if not whole and _usual(own[:_SAMPLE], burst[:_SAMPLE], begun[:_SAMPLE]) is None:
         return LoggerTimes(stamp_ns)
+    order, heads, count = _grouped(own, burst)
+    came = begun[order]
     shared, place = np.repeat(count, count), np.arange(record.size) - np.repeat(heads, count)
-    instants = np.unique(stamp)
     if whole:
-        begins, lasting = stamp[order], np.full(record.size, SECOND_NS)
-        note = "The logger's stamps are whole seconds: sentences were spread evenly over each, and one that comes once"
-        note += " in a second is known to half a second (1/sqrt(12) s, 1 s.e.: 0.29 s)."
-    else:
-        distance = np.diff(instants)
-        usual = int(np.median(distance)) if distance.size else 0
-        since = np.minimum(np.concatenate(([usual], distance)), _PAUSE * usual)
-        lasting = since[np.searchsorted(instants, stamp[order])]
-        begins = stamp[order] - lasting
+        lasting, ends = np.full(record.size, SECOND_NS), came + SECOND_NS
         note = (
-            f"Sentences of one instrument share stamps, which come every {usual / SECOND_NS:.3g} s (median): they were"
+            "The logger's stamps are whole seconds: sentences were spread evenly over each, and one that comes once in "
+            "a second is known to half a second (1/sqrt(12) s, 1 s.e.: 0.29 s)."
         )
-        note += " spread evenly over the time since the stamp before."
+    else:
+        usual = _usual(own, burst, begun)
+        if usual is None:
+            return LoggerTimes(stamp_ns)
+        since = np.concatenate(([usual], np.diff(came[heads])))
+        since[(since <= 0) | (since > _USUAL * usual)] = usual  # another source, a pause, one that speaks seldom
+        lasting, ends = np.repeat(since, count), came
+        note = (
+            f"The log's sentences come in bursts, every {usual / SECOND_NS:.3g} s (median): they were spread evenly "
+            "over the time since the burst before."
+        )
     result = stamp_ns.copy()
-    # the middle of its share of the time: half a step later than it may have come, and half a step earlier
-    result[record[order]] = begins + (2 * place + 1) * lasting // (2 * shared)
+    # each in the middle of its share of the time
+    result[record[order]] = ends - (2 * (shared - place) - 1) * lasting // (2 * shared)
     return LoggerTimes(result, (note,))
 
 
-def _in_bursts(source: Index, count: Index) -> bool:
-    """Whether sentences of some source often share their stamp with others of it."""
+def _grouped(source: Index, burst: Index) -> tuple[Index, Index, Index]:
+    """Return the lines by source and burst, where each burst of a source begins among them, and how many it has."""
+    order = np.lexsort((burst, source))
+    opens = (np.diff(source[order]) != 0) | (np.diff(burst[order]) != 0)
+    heads = np.flatnonzero(np.concatenate(([True], opens)))
+    return order, heads, np.diff(heads, append=source.size)
+
+
+def _usual(source: Index, burst: Index, came_ns: Nanoseconds) -> int | None:
+    """Return the usual distance of bursts, ns; None where no source often has several sentences in one.
+
+    Parameters
+    ----------
+    source, burst, came_ns : ndarray of int64, shape (m,)
+        Of every line: where it comes from, in which burst, and when that began.
+    """
+    order, heads, count = _grouped(source, burst)
+    source, came_ns = source[order][heads], came_ns[order][heads]
+    distances = []
     for one in np.unique(source):
-        of_it = count[source == one]
-        if of_it.sum() >= _LEAST and np.mean(of_it >= 2) >= _SHARED:
-            return True
-    return False
+        of_it = source == one
+        if count[of_it].sum() >= _LEAST and np.mean(count[of_it] >= 2) >= _SHARED:
+            distances.append(np.diff(came_ns[of_it]))
+    between = np.concatenate(distances) if distances else np.zeros(0, dtype=np.int64)
+    between = between[between > 0]
+    return int(np.sort(between)[between.size // 2]) if between.size else None
 
 
 def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:
@@ -120,7 +146,8 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
 
     How far the stamps of the fixes are ahead of the instants that the fixes give is the clock's error and the time that
     the receiver takes to send them. More than a second, or less than nothing, is the clock; it is followed through
-    steps, as where it is set, and drift.
+    steps, as where it is set, and drift. A step that the receiver's time makes, while the stamps go on, is the
+    receiver's: it stands still, or learns of leap seconds.
 
     Parameters
     ----------
@@ -132,18 +159,21 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     (at,) = np.nonzero(fix & (stamp_ns != NO_TIME) & (full_ns != NO_TIME))
     if at.size == 0:
         return LoggerTimes(stamp_ns)
-    own = full_ns[at]
-    lead = _running_median(stamp_ns[at] - own)
+    own, leapt = _without_leaps(stamp_ns[at], full_ns[at])
+    lead = _followed(stamp_ns[at] - own)
     usual = int(np.sort(lead)[lead.size // 2])
     ahead = "ahead of" if usual > 0 else "behind"
     much = f"{abs(usual) / SECOND_NS:.3f} s" if abs(usual) < DAY_NS else f"{abs(usual) / DAY_NS:.2f} days"
     size = f"{much} {ahead} the receiver's UTC (median)"
+    notes = [f"The receiver's time leaps or stands still at {leapt} of its fixes: the stamps are kept there."] * (
+        leapt > 0
+    )
     if at.size < _FEWEST:
         few = f"The logger's stamps are {size}, by {at.size} of its fixes: too few to put them right."
         return LoggerTimes(stamp_ns, () if _EARLIEST_NS <= usual <= _WORTH_NS else (few,))
     if lead.min() >= _EARLIEST_NS and lead.max() <= _LATEST_NS:
         late = f"The logger's stamps are {size}: its clock may be off, or the receiver sends so late. They were kept."
-        return LoggerTimes(stamp_ns, (late,) if usual > _WORTH_NS else ())
+        return LoggerTimes(stamp_ns, (*notes, *([late] if usual > _WORTH_NS else [])))
     (record,) = np.nonzero(stamp_ns != NO_TIME)
     before = np.clip(np.searchsorted(at, record, side="right") - 1, 0, at.size - 1)
     after = np.clip(np.searchsorted(at, record), 0, at.size - 1)
@@ -158,17 +188,35 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     result[record] = np.where(is_set, np.where(off_before <= off_after, by_before, by_after), gradual)
     moved = int(lead.max() - lead.min())
     between = f", from {lead.min() / SECOND_NS:.3f} to {lead.max() / SECOND_NS:.3f} s" if moved > _WORTH_NS else ""
-    return LoggerTimes(result, (f"The logger's clock is {size}{between}: {record.size} stamps were put right by it.",))
+    right = f"The logger's clock is {size}{between}; its stamps were put right by it ({record.size})."
+    return LoggerTimes(result, (*notes, right))
 
 
-def _running_median(value: Nanoseconds) -> Nanoseconds:
+def _without_leaps(stamp_ns: Nanoseconds, full_ns: Nanoseconds) -> tuple[Nanoseconds, int]:
+    """Return the times of fixes as if the receiver's clock had gone on evenly, and at how many fixes it did not.
+
+    Where stamps and fixes come apart, that clock has leapt whose step is farther from the usual one.
+    """
+    if full_ns.size < _FEWEST:
+        return full_ns, 0
+    step, stamped = np.diff(full_ns), np.diff(stamp_ns)
+    usual = np.median(step)
+    leaps = (np.abs(stamped - step) > _WORTH_NS) & (np.abs(step - usual) > np.abs(stamped - usual))
+    if not leaps.any():
+        return full_ns, 0
+    gone = np.concatenate(([0], np.cumsum(np.where(leaps, step - stamped, 0))))
+    # what it said most of the time is right
+    return full_ns - gone + np.sort(gone)[gone.size // 2], int(leaps.sum())
+
+
+def _followed(lead_ns: Nanoseconds) -> Nanoseconds:
     """Return the median of each value and those beside it, reflected at the ends; of few, that of all."""
-    if value.size <= 2 * _BESIDE:
-        return np.full(value.size, np.sort(value)[value.size // 2])
-    padded = np.concatenate([value[_BESIDE:0:-1], value, value[-2 : -_BESIDE - 2 : -1]])
+    if lead_ns.size <= 2 * _BESIDE:
+        return np.full(lead_ns.size, np.sort(lead_ns)[lead_ns.size // 2])
+    padded = np.concatenate([lead_ns[_BESIDE:0:-1], lead_ns, lead_ns[-2 : -_BESIDE - 2 : -1]])
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * _BESIDE + 1)
     parts = [
         np.partition(windows[first : first + _MANY], _BESIDE, axis=1)[:, _BESIDE]
-        for first in range(0, value.size, _MANY)
+        for first in range(0, lead_ns.size, _MANY)
     ]
     return np.concatenate(parts)

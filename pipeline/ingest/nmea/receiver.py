@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
@@ -14,6 +16,8 @@ from kempf.schemas.nmea import SATELLITES
 _SILENT = 3
 #: A clock that differs by more than this from the one that counts is another one, ns.
 _DIFFERS_NS = SECOND_NS // 2
+#: Fixes arrive so long after their instants by a clock that is set, ns.
+_ARRIVES_NS = (-SECOND_NS // 10, SECOND_NS)
 #: The sentence that brings position, velocity, time and date together.
 _FIX = "RMC"
 
@@ -21,9 +25,9 @@ _FIX = "RMC"
 def speaking(frames: Frames, dated: Flag, of_day_ns: Nanoseconds) -> tuple[Flag, list[str]]:
     """Return which sentences may give their time to those without one, shape (n,), and notes on other clocks.
 
-    Those of the receiver that gives most dates, RMC before ZDA; of another one only while it is silent. A display that
-    repeats a receiver's position without the date repeats it late: it gives its own sentences their time, but carries
-    none to others.
+    Those of the receiver that gives most dates, RMC before ZDA; of another one whose clock agrees only while it is
+    silent. A display that repeats a receiver's position without the date repeats it late: it gives its own sentences
+    their time, but carries none to others.
 
     Parameters
     ----------
@@ -36,47 +40,59 @@ def speaking(frames: Frames, dated: Flag, of_day_ns: Nanoseconds) -> tuple[Flag,
     if not often:
         return np.zeros(dated.size, dtype=np.bool_), []
     timed = of_day_ns != NO_TIME
+    of = {name: np.flatnonzero(timed & _of_address(frames, [name])) for name in _addresses(frames, timed)}
     first = often[0]
     for other in often[1:]:
         # of two that are as frequent, the one that is behind repeats the other
-        if _ahead(frames, first, other, timed, of_day_ns)[0] > _DIFFERS_NS:
+        if _ahead(of[first], of[other], of_day_ns)[0] > _DIFFERS_NS:
             first = other
-    talkers = {frames.names[code][:2] for code in np.unique(frames.address[dated & (frames.address >= 0)])}
+    talkers = {name[:2] for name in _addresses(frames, dated)}
     satellites = bool(talkers & SATELLITES)
-    own, others, notes = [], [], []
-    for name in frames.names:
+    own, others, notes = [first], [], []
+    for name, record in of.items():
         talker = name[:2]
-        of_one = talker == first[:2] or {talker, first[:2]} <= SATELLITES
-        ahead, usual = _ahead(frames, first, name, timed, of_day_ns)
-        agrees = -_DIFFERS_NS <= ahead <= usual + _DIFFERS_NS
-        own.append(of_one and agrees)
-        others.append(talker in talkers or (satellites and talker in SATELLITES))
-        if others[-1] and not agrees:
-            how = "ahead of" if ahead > 0 else "behind"
-            notes.append(
-                f"The clock of {name} is {abs(ahead) / SECOND_NS:.1f} s {how} that of {first} (median): sentences "
-                f"without a time are dated by {first}."
-            )
+        dates = talker in talkers or (satellites and talker in SATELLITES)
+        if name == first or not dates:
+            continue
+        ahead, usual = _ahead(of[first], record, of_day_ns)
+        if not -_DIFFERS_NS <= ahead <= usual + _DIFFERS_NS:
+            notes.append(f"{_differing(name, first, ahead)}: sentences without a time are dated by {first}.")
+        elif talker == first[:2] or {talker, first[:2]} <= SATELLITES:
+            own.append(name)
+        else:
+            others.append(name)
     speaks = _of_address(frames, own)
     return speaks | (_of_address(frames, others) & _silent(speaks & timed)), notes
 
 
-def fixes_of_one(frames: Frames, dated: Flag, late_ns: Nanoseconds) -> Flag:
-    """Return the dated sentences of the receiver that a logger's clock is compared with, shape (n,).
+def fixes_of_one(frames: Frames, dated: Flag, late_ns: Nanoseconds) -> tuple[Flag, list[str]]:
+    """Return the dated sentences of the receiver that a logger's clock is compared with, shape (n,), and notes.
 
-    Of several that are about as frequent the one whose fixes arrive first: a display repeats them late.
+    Of several that are about as frequent the one whose fixes arrive first, if they do not arrive before their instants:
+    a display repeats them late, and a clock of its own may be ahead.
 
     Parameters
     ----------
     late_ns : ndarray of int64, shape (n,)
         How long after its instant each dated sentence arrived by the logger's clock.
     """
-    lates = {
-        name: float(np.median(late_ns[dated & _of_address(frames, [other == name for other in frames.names])]))
-        for name in _frequent(frames, dated)
-    }
-    first = min(lates, key=lambda name: (lates[name], name), default="")
-    return dated & _of_address(frames, [name == first for name in frames.names])
+    lates = {name: float(np.median(late_ns[dated & _of_address(frames, [name])])) for name in _frequent(frames, dated)}
+    if not lates:
+        return np.zeros(dated.size, dtype=np.bool_), []
+    low, high = _ARRIVES_NS
+    set_by_it = {name: late for name, late in lates.items() if low <= late <= high}
+    first = min(set_by_it or lates, key=lambda name: (lates[name], name))
+    notes = [
+        f"{_differing(name, first, lates[first] - late)}."
+        for name, late in sorted(lates.items())
+        if abs(lates[first] - late) > _DIFFERS_NS
+    ]
+    return dated & _of_address(frames, [first]), notes
+
+
+def _differing(name: str, first: str, ahead_ns: float) -> str:
+    how = "ahead of" if ahead_ns > 0 else "behind"
+    return f"The clock of {name} is {abs(ahead_ns) / SECOND_NS:.1f} s {how} that of {first} (median)"
 
 
 def _frequent(frames: Frames, dated: Flag) -> list[str]:
@@ -89,19 +105,24 @@ def _frequent(frames: Frames, dated: Flag) -> list[str]:
     return sorted((name for name in counts if 2 * counts[name] >= most), key=lambda name: (-counts[name], name))
 
 
-def _ahead(frames: Frames, first: str, other: str, timed: Flag, of_day_ns: Nanoseconds) -> tuple[float, float]:
-    """Return by how much the times of one address are ahead of the latest of another, and usual distances of these, ns.
+def _addresses(frames: Frames, mark: Flag) -> list[str]:
+    """Return the addresses of marked sentences; damaged lines have many that say nothing."""
+    return [frames.names[code] for code in np.unique(frames.address[mark & (frames.address >= 0)]).tolist()]
+
+
+def _ahead(at: Index, record: Index, of_day_ns: Nanoseconds) -> tuple[float, float]:
+    """Return by how much the times of some lines are ahead of the latest of others, and usual distances of these, ns.
 
     Up to one distance later is said within it; 0 where either says nothing.
+
+    Parameters
+    ----------
+    at, record : ndarray of int64
+        The others and the lines, ascending.
     """
-    at, record = (
-        np.flatnonzero(timed & _of_address(frames, [name == one for name in frames.names])) for one in (first, other)
-    )
-    if at.size < 2 or record.size == 0 or first == other:
-        return 0.0, 0.0
     place = np.searchsorted(at, record) - 1
     record, place = record[place >= 0], place[place >= 0]
-    if record.size == 0:
+    if at.size < 2 or record.size == 0:
         return 0.0, 0.0
     usual = float(np.median(_apart(of_day_ns, at[1:], at[:-1])))
     return float(np.median(_apart(of_day_ns, record, at[place]))), max(usual, 0.0)
@@ -113,8 +134,10 @@ def _apart(of_day_ns: Nanoseconds, later: Index, earlier: Index) -> Nanoseconds:
     return difference
 
 
-def _of_address(frames: Frames, wanted: list[bool]) -> Flag:
-    of_it: Flag = np.array([*wanted, False], dtype=np.bool_)[frames.address]
+def _of_address(frames: Frames, names: Collection[str]) -> Flag:
+    wanted = np.zeros(len(frames.names) + 1, dtype=np.bool_)
+    wanted[[frames.names.index(name) for name in names]] = True
+    of_it: Flag = wanted[frames.address]
     return of_it
 
 

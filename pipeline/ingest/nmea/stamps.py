@@ -25,6 +25,13 @@ _DATE_TIME = (
     r"(?:[ \t]?(?P<zone>[Zz]|UTC|GMT|[+-][0-9]{2}:?[0-9]{2})|(?P<hours>[+-][0-9]{2}))?(?:$|[^0-9A-Za-z])"
 )
 
+#: Behind a time of day: a zone by its letters, an offset from UTC by name or in one digit, the half of the day. Read
+#: as UTC they would be hours off.
+_OTHER_ZONE = (
+    r"[0-9] ?(?:(?:UTC|GMT) ?[+-][0-9]|[+-][0-9](?:$|[^0-9])|(?i:AM|PM)\b|(?:CES?T|EES?T|WES?T|BST|IST|MSK|[ECMP][SD]T|"
+    r"JST|SGT|AES?T)\b)"
+)
+
 #: Ten digits count seconds, thirteen milliseconds: with the first digit that is asked for, the years 2001 to 2096.
 _SINCE_1970 = r"(?:^|[^0-9A-Za-z.:+-])(?P<whole>[1-3](?:[0-9]{9}|[0-9]{12}))(?:\.(?P<part>[0-9]+))?(?:$|[^0-9A-Za-z.:])"
 
@@ -107,6 +114,7 @@ def _dates_and_times(text: pl.Series) -> tuple[Nanoseconds, Flag, Flag]:
     part = pl.when(pl.col("part").is_null()).then(_NONE).otherwise(pl.lit(".") + pl.col("part").str.slice(0, 9))
     zone = pl.coalesce("zone", "hours", _NONE).str.replace(r"^(?:UTC|GMT)$", "Z")
     names = ("year", "month", "day", "hour", "minute", "second")
+    text = pl.select(pl.when(~text.str.contains(_OTHER_ZONE)).then(text)).to_series()
     found = text.str.extract_groups(_DATE_TIME).struct.unnest()
     return iso_instants(spans_of(found.select(pl.format("{}-{}-{}T{}:{}:{}{}{}", *names, part, zone)).to_series()))
 
