@@ -142,7 +142,10 @@ def identified(log: bytes) -> Identified:
         warehouse = Warehouse(folder)
         profile = logger_profile(SETTINGS)
         taken = ingest_log(warehouse, "mariner", "log.nmea", LogFile(log), profile, "mariner")
-        tally, notes = taken.tally, tuple(note for note in taken.notes if "clock" in note or "stamp" in note)
+        tally, notes = (
+            taken.tally,
+            tuple(note for note in taken.notes if any(word in note for word in ("clock", "stamp", "bursts"))),
+        )
         try:
             found = identify_vessel(warehouse, "mariner")
         except NotFound:
