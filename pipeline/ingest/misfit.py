@@ -19,6 +19,9 @@ _FEWEST, _SHARE = 20, 0.01
 #: Share of a stretch of rows that makes it one of rows with another number of cells.
 _DENSE = 0.9
 
+#: Number of cells of a row with a quotation that is not closed: nobody can say.
+OPEN = -1
+
 #: Characters of a cell that a message quotes.
 _CUT = 60
 
@@ -63,7 +66,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     ----------
     layout : Layout
     count : ndarray of int64, shape (n,)
-        Cells of each row, 0 where nobody can say.
+        Cells of each row, 0 or `OPEN` where nobody can say.
     named : bool
         Whether the profile names the columns, not the header.
     """
@@ -106,6 +109,32 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     others = f", and {wrong.size - at.size} have another number" if wrong.size > at.size else ""
     found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}{others}; {expected}."
     return Misfit(found, step, wrong.size)
+
+
+def quotations_amiss(layout: Layout, count: Index) -> Misfit | None:
+    """Return what is to be said of rows with a quotation that is not closed; None if they are few.
+
+    Parameters
+    ----------
+    layout : Layout
+    count : ndarray of int64, shape (n,)
+        Cells of each row, `OPEN` for these.
+    """
+    n = len(layout.rows)
+    amiss = np.flatnonzero(count == OPEN)
+    if not _many(amiss.size, n):
+        return None
+    one = int(amiss[amiss.size // 2])
+    (text,) = layout.rows.take(np.array([one])).text(limit=_CUT)
+    found = (
+        f"In {_of_all(amiss.size, n).lower()} rows a cell begins with a quotation mark that is never closed, such as "
+        f"{text!r} of {_place(layout.rows, one)}; expected a second mark at the end of the cell, in the same line."
+    )
+    step = (
+        "Export the log with a mark at either end of such a cell or with none, and without line ends within a cell; or "
+        "take the marks out of a copy of it."
+    )
+    return Misfit(found, step, amiss.size)
 
 
 def times_amiss(

@@ -2,14 +2,18 @@
 
 import io
 import math
+import random
 import tarfile
 from datetime import UTC, datetime
 from time import process_time
 
+import numpy as np
 import pytest
 
 from kempf.pipeline.ingest import delimited
+from kempf.pipeline.ingest.quoting import inside_quotes
 from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.spans import lines_of
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile
 
@@ -262,9 +266,32 @@ def test_a_separator_behind_the_last_cell_is_read_in_rows_in_the_header_and_in_b
 
 
 def test_a_last_cell_that_is_empty_for_once_is_no_separator_too_many():
-    readings = read(f"utc,sog,hdg\n{T}1Z,1,\n{T}2Z,1,\n{T}3Z,1,90,\n{T}4Z,1,90\n")
-    assert readings.frame["heading_rad"].to_list() == [None, None, math.radians(90)]
-    assert readings.rejected["record"].to_list() == [2]
+    readings = read(f"utc,sog,hdg\n{T}1Z,1,\n{T}2Z,1,\n{T}3Z,1,90,\n{T}4Z,1,90\n{T}5Z,1,90,,\n{T}6Z,1,90,7\n")
+    assert readings.frame["heading_rad"].to_list() == [None, None, math.radians(90), math.radians(90)]
+    assert readings.rejected["record"].to_list() == [4, 5]
+
+
+@pytest.mark.parametrize("sign", [",", "\t"])
+@pytest.mark.parametrize(
+    ("header", "some", "more"), [("", "", ","), ("", ',""', ", "), (",", "", ","), (",,", "", ",,")]
+)
+def test_rows_with_and_without_a_separator_behind_the_last_cell_stand_in_one_file(header, some, more, sign):
+    lines = [f"utc,sog,hdg{header}", *rows_of(30, 0, some), *rows_of(50, 30, more), "2025-05-03T08:00:00Z,1"]
+    readings = read("\n".join(lines).replace(",", sign))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(k) for k in range(80)]
+    assert readings.tally.by_reason == {"malformed": 1}
+
+
+def test_a_message_has_the_number_of_columns_of_the_header_itself():
+    lines = ["utc,sog,hdg", *rows_of(30, 0, ","), *rows_of(25, 30, ",7,8")]
+    assert "25 of 55 rows have 5 cells" in (note := read("\n".join(lines)).notes[0]) and "the header has 3." in note
+
+
+def test_a_column_without_a_name_may_be_the_first_as_pandas_writes_an_index():
+    lines = ["\tutc\tsog\thdg", *(f"{k}\t{T}{k}Z\t1\t{k}" for k in range(9))]
+    readings = read("\n".join(lines))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(k) for k in range(9)]
+    assert delimited.titled("\n".join(lines).encode()) is None
 
 
 @pytest.mark.parametrize(
@@ -356,7 +383,7 @@ def test_an_hour_of_one_digit_beside_hours_of_two_costs_no_row():
     readings = read(text)
     assert (readings.frame["time_utc_ns"][1] - readings.frame["time_utc_ns"][0]) == 10**9
     assert readings.rejected["record"].to_list() == [2, 3]
-    assert readings.notes == ("Times without a zone are taken as UTC.",)
+    assert readings.notes[1:] == ("Times without a zone are taken as UTC.",)
 
 
 @pytest.mark.parametrize(
@@ -390,6 +417,20 @@ def test_a_block_of_nul_bytes_costs_one_row_wherever_it_stands(place, length):
     readings = read("\n".join(lines))
     assert readings.rejected["record"].to_list() == ([place - 1] if place else [])
     assert readings.tally.records_read == 200
+
+
+@pytest.mark.parametrize("title", [[], ["KVLCC2, a trial"]])
+def test_a_block_of_nul_bytes_that_ends_a_line_before_the_header_is_no_header(title):
+    data = "\n".join(["\0" * 600, *title, "utc,sog,hdg", *rows_of(9), "\0" * 16, *rows_of(9, 9)]).encode()
+    readings = read(data, profile(header_lines=len(title)))
+    assert readings.rejected["record"].to_list() == [9] and readings.tally.records_kept == 18
+    assert delimited.titled(data) is None or delimited.titled(data).header_lines == len(title)
+
+
+def test_a_block_of_nul_bytes_is_a_row_where_no_header_stands_before_the_rows():
+    data = "\n".join(["\0" * 600, *rows_of(9)])
+    readings = read(data, profile(columns=["utc", "sog", "hdg"]))
+    assert readings.rejected["record"].to_list() == [0] and readings.tally.records_kept == 9
 
 
 @pytest.mark.parametrize("data", [bytes(100), b"\0\n" * 99, bytes(50_000) + b"\x01\x02,\x03\n" * 9, b"a,b\0\n" * 99])
@@ -456,3 +497,61 @@ def test_a_few_damaged_rows_are_counted_and_not_noted():
     lines[100:1100:50] = [row + ",7" for row in lines[100:1100:50]]
     readings = read("\n".join(["utc,sog,hdg", *lines]))
     assert readings.tally.by_reason == {"malformed": 20} and readings.notes == ()
+
+
+INCHES, NOTE = '5",6"', '5"'
+
+
+@pytest.mark.parametrize(
+    ("names", "more"), [("a,b", INCHES), ("note", NOTE), ("a", ' 5" of "x"'), ("a,b", '"a, b", 5"')]
+)
+def test_a_quotation_mark_within_a_cell_is_text(names, more):
+    readings = read("\n".join([f"utc,sog,hdg,{names}", *rows_of(30, 0, f",{more}")]))
+    assert readings.frame.height == 30 and readings.notes == ()
+
+
+def test_quotations_that_are_never_closed_are_reported_as_such():
+    rows = [*rows_of(10), *rows_of(30, 10, ',"open')]
+    with pytest.raises(DataRejected) as error:
+        read("\n".join(["utc,sog,hdg,note", *rows[10:]]))
+    assert "In all 30 rows a cell begins with a quotation mark that is never closed, such as" in error.value.message
+    assert "of row 16 (line 17); expected a second mark" in error.value.message
+    assert error.value.next_step.startswith("Export the log with a mark at either end")
+    assert "In 30 of 40 rows" in read("\n".join(["utc,sog,hdg", *rows])).notes[0]
+
+
+def _by_steps(row, sign):
+    """Return the cells of a row, None where a quotation is not closed, character by character."""
+    cells, state = [""], "begin"
+    for c in row:
+        if state == "quoted":
+            state = "closed" if c == '"' else "quoted"
+        elif state == "closed" and c == '"':
+            state = "quoted"
+        elif c == sign:
+            cells.append("")
+            state = "begin"
+            continue
+        elif state == "begin" and c == '"':
+            state = "quoted"
+        elif not (state == "begin" and c in " \t"):
+            state = "text"
+        cells[-1] += c
+    return None if state == "quoted" else cells
+
+
+@pytest.mark.parametrize("sign", [",", "\t", ";"])
+def test_quotations_in_columns_are_those_character_by_character(sign):
+    chance = random.Random(7)
+    rows = ["".join(chance.choices('"" a' + 2 * sign, k=chance.randint(1, 12))) for _ in range(4000)]
+    data = ("\n".join(rows)).encode()
+    inside, closed = inside_quotes(
+        np.frombuffer(data, dtype=np.uint8), lines_of(np.frombuffer(data, dtype=np.uint8)), sign
+    )
+    at = 0
+    for row, whole in zip(rows, closed, strict=True):
+        expected = _by_steps(row, sign)
+        assert whole == (expected is not None), row
+        if expected is not None:
+            assert sum(c == sign and not inside[at + k] for k, c in enumerate(row)) == len(expected) - 1, row
+        at += len(row) + 1
