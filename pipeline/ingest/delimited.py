@@ -16,15 +16,15 @@ from kempf.pipeline.ingest.misfit import OPEN, cells_amiss, quotations_amiss, ti
 from kempf.pipeline.ingest.quoting import inside_quotes
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
-from kempf.pipeline.ingest.text.cells import number
+from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA, number
 from kempf.pipeline.ingest.text.row_times import row_times
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 
-#: A number with a comma before its decimals, and how many cells of a column are looked at for one.
-_COMMA, _LOOKED_AT_CELLS = r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", 2000
+#: How many cells of a column are looked at for a decimal comma.
+_LOOKED_AT_CELLS = 2000
 #: Most characters of a cell that are looked at: far more than any number or time has.
 _LONGEST_CELL = 1_000
 
@@ -78,7 +78,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         raise UsageError("no_time_column", f"The source for {name} names no time column.", "Add 'time' to the source.")
     layout = layout_of(data, source)
     wanted = list(dict.fromkeys([*source.time.columns, *source.channels]))
-    _check_columns(name, layout, wanted)
+    _check_columns(name, layout, wanted, source.encoding)
     check_once(name, source.channels)
     count, cells = _cells(layout, wanted)
     whole = count == len(layout.columns)
@@ -172,7 +172,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
+def _check_columns(name: str, layout: Layout, wanted: list[str], encoding: str) -> None:
     columns = list(layout.columns)
     missing = [column for column in wanted if column not in columns]
     if missing:
@@ -181,7 +181,7 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
             f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
             f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
-            advice_on(columns)
+            advice_on(columns, encoding)
             + "Correct the names in the profile's source, or its separator, header_lines or columns.",
             {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
@@ -198,10 +198,10 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
 def _with_points(name: str, cells: dict[str, pl.Series], source: Source) -> dict[str, pl.Series]:
     """Return the cells with a point before the decimals; a comma that the profile does not name is refused."""
     if source.decimal == ",":
-        return {column: cell.str.replace(_COMMA, "$1.$2") for column, cell in cells.items()}
+        return {column: cell.str.replace(DECIMAL_COMMA, "$1.$2") for column, cell in cells.items()}
     for column in source.channels:
         shown = cells[column].head(_LOOKED_AT_CELLS).drop_nulls()
-        with_comma = shown.filter(shown.str.contains(_COMMA))
+        with_comma = shown.filter(shown.str.contains(DECIMAL_COMMA))
         if 2 * len(with_comma) > len(shown):
             raise UsageError(
                 "decimal_comma",

@@ -197,7 +197,7 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
             f"the columns found in it are {', '.join(repr(c) for c in columns) or 'none'}.",
-            f"{advice_on(columns)}"
+            f"{advice_on(columns, source.encoding if source else 'utf-8')}"
             f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. "
             + _SEE_PROFILE,
             {"name": name, "columns": columns, "patterns": [s.match for s in profile.sources]},

@@ -460,7 +460,7 @@ def test_a_column_that_was_added_on_the_way_is_noted_with_the_row_from_which_on(
     assert readings.tally.by_reason == {"malformed": 401}
     (note,) = readings.notes
     assert note.startswith(
-        "400 of 1001 rows have 4 cells parted by ',', from row 601 (line 603) on, and 1 have another number; the "
+        "400 of 1001 rows have 4 cells parted by ',', from row 601 (line 603) on, and 1 has another number; the "
         "header has 3. Columns were added"
     )
 
@@ -497,6 +497,22 @@ def test_a_few_damaged_rows_are_counted_and_not_noted():
     lines[100:1100:50] = [row + ",7" for row in lines[100:1100:50]]
     readings = read("\n".join(["utc,sog,hdg", *lines]))
     assert readings.tally.by_reason == {"malformed": 20} and readings.notes == ()
+
+
+def test_one_row_is_no_stretch_at_which_a_log_is_to_be_cut():
+    (note,) = read(f"utc,sog,hdg\n{T}1Z,1,90\n{T}2Z\n{T}3Z,2,91,4,5\n").notes[:1]
+    assert note.startswith("1 of 3 rows has 1 cell parted by ',', and 1 has another number; the header has 3.")
+    assert "cut the log" not in note
+    with pytest.raises(DataRejected, match=r"The only row has 1 cell parted by ','; the header has 3\."):
+        read(f"utc,sog,hdg\n{T}2Z\n")
+
+
+@pytest.mark.parametrize("unit", ["s", None])
+def test_a_time_with_a_decimal_comma_is_reported_as_one(unit):
+    text = "utc;sog;hdg\n" + "".join(f"{k},5;1;90\n" for k in range(9))
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"column": "utc", **({"unit": unit} if unit else {})}))
+    assert "`decimal: ','`" in error.value.next_step and "leave `unit` out" not in error.value.next_step
 
 
 INCHES, NOTE = '5",6"', '5"'
