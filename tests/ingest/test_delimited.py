@@ -242,8 +242,31 @@ def test_a_log_of_which_most_is_refused_says_so_first():
     rows = "".join(f"{T}{9 - k}Z,{k + 1},90\n" for k in range(9))
     readings = read("utc,sog,hdg\n" + rows)
     assert readings.tally.by_reason == {"clock_back": 8}
-    assert readings.notes[0].startswith("8 refusals, most of the log, are clock_back")
+    assert readings.notes[0].startswith("8 of 9 records, most of the log, are refused as clock_back")
     assert "backwards" in readings.notes[0]
+
+
+@pytest.mark.parametrize(("bad", "much"), [(100, "all"), (60, "60")])
+def test_a_channel_of_which_most_values_are_refused_is_named_where_the_records_are_kept(bad, much):
+    rows = [row.replace(",1,", ",-9999,") if k < bad else row for k, row in enumerate(rows_of(100))]
+    readings = read("\n".join(["utc,sog,hdg", *rows]))
+    assert readings.tally.records_kept == 100 and readings.tally.by_reason == {"out_of_range": bad}
+    (note,) = readings.notes
+    assert note.startswith(
+        f"Of 100 values of speed_over_ground in records of which something is kept, {much} are refused as out_of_range"
+    )
+
+
+def test_values_that_are_refused_are_no_share_of_the_records():
+    rows = [row.replace(",1,", ",-9999,") if k < 40 else row for k, row in enumerate(rows_of(100))]
+    assert read("\n".join(["utc,sog,hdg", *rows])).notes == ()
+
+
+def test_advice_on_coarse_times_is_that_for_the_format():
+    rows = [f"{T}{k // 5}Z,1,{k}" for k in range(20)]
+    note = read("\n".join(["utc,sog,hdg", *rows])).notes[0]
+    assert note.startswith("16 of 20 records, most of the log, are refused as same_instant") and "coarser" in note
+    assert "column of finer ones" in note and "MCAP" not in note and "publish_time" not in note
 
 
 def test_nothing_that_can_be_read_is_shown_by_a_sample():
