@@ -42,7 +42,7 @@ def draft(path: Path) -> str:
         description = "of no known format" if log_format is None else "text without columns"
         next_step = "Export the log as delimited text with a line of column names, or as NMEA 0183 or MCAP."
         raise _no_draft(path, "JSON text" if is_json(data) else description, next_step, log_format)
-    encoding = "latin-1" if advice_on(columns) else None
+    encoding = "latin-1" if advice_on(columns, "utf-8") else None
     if encoding:
         data = as_utf8(data, encoding)
         columns = delimited.columns_found(data, None, most=None)

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from statistics import median
+from itertools import dropwhile
 
 import numpy as np
 import polars as pl
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Reason, Values
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8
-from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, cells_of, fitted, layout_of
+from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, cells_of, fits, layout_of
 from kempf.pipeline.ingest.mapping import check_once
-from kempf.pipeline.ingest.misfit import cells_amiss, times_amiss
+from kempf.pipeline.ingest.misfit import OPEN, cells_amiss, quotations_amiss, times_amiss
+from kempf.pipeline.ingest.quoting import inside_quotes
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
-from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank
-from kempf.pipeline.ingest.text.cells import number
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
+from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA, number
 from kempf.pipeline.ingest.text.row_times import row_times
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 
-#: A number with a comma before its decimals, and how many cells of a column are looked at for one.
-_COMMA, _LOOKED_AT_CELLS = r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$", 2000
+#: How many cells of a column are looked at for a decimal comma.
+_LOOKED_AT_CELLS = 2000
 #: Most characters of a cell that are looked at: far more than any number or time has.
 _LONGEST_CELL = 1_000
 
@@ -77,7 +78,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         raise UsageError("no_time_column", f"The source for {name} names no time column.", "Add 'time' to the source.")
     layout = layout_of(data, source)
     wanted = list(dict.fromkeys([*source.time.columns, *source.channels]))
-    _check_columns(name, layout, wanted)
+    _check_columns(name, layout, wanted, source.encoding)
     check_once(name, source.channels)
     count, cells = _cells(layout, wanted)
     whole = count == len(layout.columns)
@@ -92,6 +93,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     unread = record[~timed.good & timed.stated]
     reason[unread] = CODE[Reason.MALFORMED]
     misfits = (
+        quotations_amiss(layout, count),
         cells_amiss(layout, count, named=source.columns is not None),
         times_amiss(layout.rows, {key: cells[key] for key in source.time.columns}, record, unread, source.time),
     )
@@ -118,9 +120,11 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
 
 def columns_found(data: bytes, source: Source | None, most: int | None = _SHOWN) -> list[str]:
     """Return the first names of columns that a file's header shows, for a person who writes its profile."""
-    columns = layout_of(data, source or Source(match="*")).columns
-    # one without a name at the end is a separator too many
-    return list((columns if not columns or columns[-1] else columns[:-1])[:most])
+    columns = list(layout_of(data, source or Source(match="*")).columns)
+    # those without a name at the end are separators too many
+    while columns and not columns[-1]:
+        columns.pop()
+    return columns[:most]
 
 
 def titled(data: bytes) -> Titled | None:
@@ -131,15 +135,19 @@ def titled(data: bytes) -> Titled | None:
     data : bytes
         Whole, or its first lines.
     """
-    text = [line.strip() for line in as_utf8(data[:SAMPLE], "utf-8").decode("utf-8", errors="replace").splitlines()]
-    lines = [(k, line) for k, line in enumerate(text[:_LOOKED_AT]) if line]
+    text = as_utf8(data[:SAMPLE], "utf-8").decode("utf-8", errors="replace").splitlines()
+    # a block of NULs before the first line is no line of title
+    written = list(dropwhile(lambda line: line and not line.strip("\0"), text))
+    # tabs at either end may part empty cells
+    lines = [(k, line.strip(" \r\v\f")) for k, line in enumerate(written[:_LOOKED_AT]) if line.strip()]
     if len(lines) < _FEWEST:
         return None
     later = [line for _, line in lines[len(lines) // 2 : -1]]
     first = separator_of(lines[0][1])
     # a damaged row or two make no title of a head
     below = [cells_of(line, first) for line in later]
-    if first and median(map(len, below)) == len(fitted(cells_of(lines[0][1], first), below)):
+    names = cells_of(lines[0][1], first)
+    if first and 2 * sum(fits(cells, names) for cells in below) > len(below):
         return None
     for separator in (",", ";", "\t", "whitespace"):
         counts = {len(cells_of(line, separator)) for line in later}
@@ -152,8 +160,8 @@ def titled(data: bytes) -> Titled | None:
         begin -= 1
     place, head = lines[begin]
     cells = cells_of(head, separator)
-    names = () if any(map(_is_number, cells)) else tuple(cells)
-    return Titled(place, separator, names, count) if begin or separator == "whitespace" else None
+    named = () if any(map(_is_number, cells)) else tuple(cells)
+    return Titled(place, separator, named, count) if begin or separator == "whitespace" else None
 
 
 def _is_number(cell: str) -> bool:
@@ -164,7 +172,7 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
+def _check_columns(name: str, layout: Layout, wanted: list[str], encoding: str) -> None:
     columns = list(layout.columns)
     missing = [column for column in wanted if column not in columns]
     if missing:
@@ -173,7 +181,7 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
             f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
             f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
-            advice_on(columns)
+            advice_on(columns, encoding)
             + "Correct the names in the profile's source, or its separator, header_lines or columns.",
             {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
@@ -190,10 +198,10 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
 def _with_points(name: str, cells: dict[str, pl.Series], source: Source) -> dict[str, pl.Series]:
     """Return the cells with a point before the decimals; a comma that the profile does not name is refused."""
     if source.decimal == ",":
-        return {column: cell.str.replace(_COMMA, "$1.$2") for column, cell in cells.items()}
+        return {column: cell.str.replace(DECIMAL_COMMA, "$1.$2") for column, cell in cells.items()}
     for column in source.channels:
         shown = cells[column].head(_LOOKED_AT_CELLS).drop_nulls()
-        with_comma = shown.filter(shown.str.contains(_COMMA))
+        with_comma = shown.filter(shown.str.contains(DECIMAL_COMMA))
         if 2 * len(with_comma) > len(shown):
             raise UsageError(
                 "decimal_comma",
@@ -208,7 +216,7 @@ def _with_points(name: str, cells: dict[str, pl.Series], source: Source) -> dict
 def _cells(layout: Layout, wanted: list[str]) -> tuple[Index, dict[str, pl.Series]]:
     """Cut the cells of some columns out of the rows that have as many as there are columns.
 
-    Also return how many cells each row has, 0 where nobody can say.
+    Also return how many cells each row has, as `_cut` does; 0 for one that is too long to be cut.
     """
     rows = layout.rows
     count = np.zeros(len(rows), dtype=np.int64)
@@ -235,36 +243,55 @@ def _alone(rows: Spans) -> Spans:
 
 
 def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Index, dict[str, pl.Series]]:
-    """Do that for some rows, with which the buffer begins and ends but for a byte."""
+    """Cut the cells of some columns out of the rows of one block, which fill its buffer but for a byte at the end.
+
+    Also return how many cells each row has, `OPEN` where a quotation is not closed. A row that has one empty cell more
+    than there are columns, or none for columns without a name at the end, counts as one that has them all.
+    """
     buffer, width = rows.buffer, len(layout.columns)
     separator = layout.separator or "\x1f"
     if separator == "whitespace":
         buffer[rows.stop] = _FEED
         buffer, rows = _one_tab(buffer, rows)
         separator = "\t"
-    quote = buffer == _QUOTE
-    quoted = bool(quote.any()) and layout.separator != "whitespace"
+    quoted = layout.separator != "whitespace" and bool((buffer == _QUOTE).any())
     mark = buffer == ord(separator) if ord(separator) < 128 else np.zeros(buffer.size, dtype=np.bool_)
-    even = np.ones(len(rows), dtype=np.bool_)
+    closed = np.ones(len(rows), dtype=np.bool_)
     if quoted:
-        inside, even = _inside_quotes(quote, rows)
+        inside, closed = inside_quotes(buffer, rows, separator)
         mark &= ~inside
     places = np.flatnonzero(mark)
     low, high = np.searchsorted(places, rows.start), np.searchsorted(places, rows.stop)
-    count = np.where(even, high - low + 1, 0)
+    count = np.where(closed, high - low + 1, OPEN)
+    more = np.flatnonzero(count == width + 1)
+    count[more[_is_empty(Spans(buffer, places[high[more] - 1] + 1, rows.stop[more]))]] = width
+    count[(count >= layout.fewest) & (count < width)] = width
     whole = count == width
     low, good = low[whole], rows.take(whole)
+    signs = high[whole] - low
     # a file may have very many columns of which few are asked for: only these are cut
     bounds = np.append(places, 0)
     cells = {}
     for name in wanted:
         k = layout.columns.index(name)
-        start = good.start if k == 0 else bounds[np.minimum(low + k - 1, places.size)] + 1
-        stop = good.stop if k == width - 1 else bounds[np.minimum(low + k, places.size)]
+        start, stop = good.start, good.stop
+        if k:
+            start = np.where(k <= signs, bounds[np.minimum(low + k - 1, places.size)] + 1, good.stop)
+        if k < width - 1 or more.size:
+            stop = np.where(k < signs, bounds[np.minimum(low + k, places.size)], good.stop)
         text = Spans(buffer, start, stop).text(limit=_LONGEST_CELL).alias(name)
         cell = _unquoted(pl.col(name).str.strip_chars()) if quoted else pl.col(name).str.strip_chars()
         cells[name] = text.to_frame().select(cell.replace("", None)).to_series()
     return count, cells
+
+
+def _is_empty(cells: Spans) -> Flag:
+    """Return which cells hold nothing, be it between quotation marks."""
+    cells = trimmed(cells)
+    buffer, length = cells.buffer, cells.stop - cells.start
+    pair = (length == 2) & (buffer[cells.start] == _QUOTE) & (buffer[cells.stop - 1] == _QUOTE)
+    empty: Flag = (length == 0) | pair
+    return empty
 
 
 def _unquoted(cell: pl.Expr) -> pl.Expr:
@@ -272,17 +299,6 @@ def _unquoted(cell: pl.Expr) -> pl.Expr:
     inner = cell.str.slice(1, cell.str.len_chars() - 2).str.replace_all('""', '"', literal=True).str.strip_chars()
     is_quoted = cell.str.starts_with('"') & cell.str.ends_with('"') & (cell.str.len_chars() >= 2)
     return pl.when(is_quoted).then(inner).otherwise(cell)
-
-
-def _inside_quotes(quote: Flag, rows: Spans) -> tuple[Flag, Flag]:
-    """Return which bytes stand between quotation marks, and which rows close all of theirs."""
-    # whether the marks up to each byte are odd in number; a count of them would take eight times the memory
-    odd = np.logical_xor.accumulate(quote)
-    before = odd[rows.start - 1] & (rows.start > 0)
-    turn = np.zeros(quote.size, dtype=np.bool_)
-    if before.size:
-        turn[rows.start] = before ^ np.append([False], before[:-1])
-    return odd ^ np.logical_xor.accumulate(turn), (odd[rows.stop - 1] & (rows.stop > 0)) == before
 
 
 def _one_tab(buffer: Bytes, rows: Spans) -> tuple[Bytes, Spans]:

@@ -62,8 +62,18 @@ def as_utf8(data: bytes, encoding: str) -> bytes:
     return data.removeprefix(codecs.BOM_UTF8)
 
 
-def advice_on(names: list[str]) -> str:
-    """Return what to do where names of columns are not in the encoding by which they were read; else nothing."""
+def advice_on(names: list[str], encoding: str) -> str:
+    """Return what to do where names of columns are not in the encoding by which they were read; else nothing.
+
+    Examples
+    --------
+    >>> advice_on(["Kurs [\ufffd]"], "ascii")[:27]
+    'The names are not in ascii:'
+    """
     if not any("\ufffd" in name for name in names):
         return ""
-    return "The names are not in UTF-8: write `encoding: latin-1`, or what the logger uses, into the profile's source. "
+    step = "correct `encoding` in the profile's source, or leave it out where the log is in UTF-8. "
+    if codecs.lookup(encoding).name == "utf-8":
+        encoding = "UTF-8"
+        step = "write `encoding: latin-1`, or what the logger uses, into the profile's source. "
+    return f"The names are not in {encoding}: {step}"

@@ -9,15 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.ingest.encoding import as_utf8
+from kempf.pipeline.ingest.quoting import has_open_mark
 from kempf.pipeline.ingest.sniff import separator_of
-from kempf.pipeline.ingest.spans import Spans, as_bytes, lines_of, trimmed
+from kempf.pipeline.ingest.spans import Spans, as_bytes, is_blank, lines_of, trimmed
 from kempf.schemas.profile import Source
 
 #: Longest row that is cut into cells, bytes.
 LONGEST_ROW = 1 << 20
-
-#: Rows, spread over the file, by which it is seen how its rows end.
-_LOOKED_AT = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +24,15 @@ class Layout:
 
     #: Every line of data that is not blank, shape (n,).
     rows: Spans
-    #: Names of the columns; empty for one that has none.
+    #: Names of the columns as the header or the profile has them; empty for one that has none.
     columns: tuple[str, ...]
     #: One character, ``whitespace``, or None for a single column.
     separator: str | None
+
+    @property
+    def fewest(self) -> int:
+        """Cells that a row has at least: columns without a name at the end need none."""
+        return fewest_cells(self.columns)
 
 
 def layout_of(data: bytes, source: Source) -> Layout:
@@ -48,20 +51,19 @@ def layout_of(data: bytes, source: Source) -> Layout:
         ``unknown_encoding``.
     """
     lines = trimmed(lines_of(as_bytes(as_utf8(data, source.encoding))))
+    if source.header_lines or source.columns is None:
+        # a block of zeros that a logger left behind before its first line is none of the lines that the profile counts
+        lines = _from_text_on(lines)
     behind_header = np.arange(len(lines)) >= source.header_lines
     lines = lines.take(behind_header & (lines.stop > lines.start))
-    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 30).to_list()
-    separator = source.separator or separator_of(first[0] if first else "")
+    written = _from_text_on(lines)
+    first = written.take(np.arange(min(1, len(written))))
+    separator = source.separator or separator_of(_text_of(first))
     if source.columns is not None:
-        names, rows = source.columns, _untrimmed(lines, separator)
-    else:
-        names = cells_of(first[0].strip("\0"), separator) if first else []
-        rows = _untrimmed(lines.take(np.arange(1, len(lines))), separator)
-    if separator is not None and separator != "whitespace" and len(rows):
-        spread = np.unique(np.linspace(0, len(rows) - 1, _LOOKED_AT).astype(np.int64))
-        shown = rows.take(spread).text(limit=LONGEST_ROW).to_list()
-        names = fitted(names, [cells_of(row, separator) for row in shown])
-    return Layout(rows, tuple(names), separator)
+        return Layout(_untrimmed(lines, separator), tuple(source.columns), separator)
+    header = _text_of(_untrimmed(first, separator)).strip("\0")
+    names = cells_of(header, separator) if len(first) else []
+    return Layout(_untrimmed(written.take(np.arange(1, len(written))), separator), tuple(names), separator)
 
 
 def cells_of(line: str, separator: str | None) -> list[str]:
@@ -77,9 +79,8 @@ def cells_of(line: str, separator: str | None) -> list[str]:
     >>> cells_of('time, "depth, below keel" ,', ",")
     ['time', 'depth, below keel', '']
     """
-    marks = line.count('"')
-    # a mark that is never closed is one of damage
-    if separator is not None and separator != "whitespace" and marks and marks % 2 == 0:
+    # a quotation that is never closed is one of damage
+    if separator not in {None, "whitespace"} and '"' in line and not has_open_mark(line, str(separator)):
         try:
             # a blank that is skipped must not be the separator
             (parts,) = csv.reader([line], delimiter=separator, skipinitialspace=separator != " ")
@@ -90,36 +91,54 @@ def cells_of(line: str, separator: str | None) -> list[str]:
     return [part.strip().strip('"').strip() for part in parts]
 
 
-def fitted(names: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
-    """Return the names of the columns with as many at their end as the rows have cells.
+def fewest_cells(names: Sequence[str]) -> int:
+    """Return how many cells a row has at least: as many as there are names, without empty ones at the end.
+
+    Examples
+    --------
+    >>> fewest_cells(["t", "", "heading", ""])
+    3
+    """
+    count = len(names)
+    while count > 1 and not names[count - 1]:
+        count -= 1
+    return count
+
+
+def fits(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Return whether a row has as many cells as there are names.
 
     Many loggers write a separator behind the last cell too, be it in the rows or in the header: a cell that is empty,
     or a column without a name.
 
-    Parameters
-    ----------
-    names : sequence of str
-        As the header has them.
-    rows : sequence of sequence of str
-        The cells of some rows.
-
     Examples
     --------
-    >>> fitted(["t", "heading"], [["1", "90", ""], ["2", "91", ""]])
-    ['t', 'heading', '']
+    >>> fits(["1", "90", ""], ["t", "heading"]), fits(["1", "90"], ["t", "heading", ""]), fits(["1"], ["t", "heading"])
+    (True, True, False)
     """
-    names = list(names)
-    behind = sum(len(cells) == len(names) + 1 and not cells[-1] for cells in rows)
-    short = sum(len(cells) == len(names) - 1 for cells in rows)
-    if 2 * behind > len(rows):
-        return [*names, ""]
-    if 2 * short > len(rows) and not names[-1]:
-        return names[:-1]
-    return names
+    more = len(cells) - len(names)
+    return more == 1 and not cells[-1] if more > 0 else len(cells) >= fewest_cells(names)
+
+
+def _text_of(line: Spans) -> str:
+    """Return the text of one line, or of none."""
+    return "".join(line.text(limit=1 << 30))
+
+
+def _from_text_on(lines: Spans) -> Spans:
+    """Leave out the lines at the beginning that hold nothing but NULs, and blank ones among them."""
+    if len(lines) == 0 or lines.stop[0] == lines.start[0] or lines.buffer[lines.start[0] : lines.stop[0]].any():
+        return lines
+    rest = lines.buffer[lines.stop[0] :]
+    written = (rest != 0) & ~is_blank(rest)
+    if not written.any():
+        return lines.take(np.arange(0))
+    begin = int(lines.stop[0]) + int(np.argmax(written))
+    return lines.take(lines.stop > begin)
 
 
 def _untrimmed(lines: Spans, separator: str | None) -> Spans:
-    """Give back the tabs at the end of the lines where the tab is the separator: they stand for empty cells."""
+    """Give back the tabs at either end of the lines where the tab is the separator: they stand for empty cells."""
     if separator != "\t" or len(lines) == 0:
         return lines
     full = lines_of(lines.buffer)

@@ -11,6 +11,7 @@ import polars as pl
 from kempf.pipeline.ingest.decoded import Misfit
 from kempf.pipeline.ingest.layout import Layout
 from kempf.pipeline.ingest.spans import Index, Spans
+from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA
 from kempf.schemas.profile import TimeColumn
 
 #: Damage is a few rows here and there: of so many, and of such a share, the layout is to blame.
@@ -18,6 +19,9 @@ _FEWEST, _SHARE = 20, 0.01
 
 #: Share of a stretch of rows that makes it one of rows with another number of cells.
 _DENSE = 0.9
+
+#: Number of cells of a row with a quotation that is not closed: nobody can say.
+OPEN = -1
 
 #: Characters of a cell that a message quotes.
 _CUT = 60
@@ -52,6 +56,9 @@ _ON_LONE_COLUMNS = (
         "its `start`. Days, as spreadsheets count them, are none of these: export them as dates.",
     ),
 )
+_COMMA_ADVICE = (
+    "This is a number with a comma before its decimals: write `decimal: ','` into the profile's source for this log."
+)
 _OTHER_DATE = r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ]\d{1,2}[-./ ]\d{1,4}(?!\d)"
 _DATE_ADVICE = "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`."
 
@@ -63,7 +70,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     ----------
     layout : Layout
     count : ndarray of int64, shape (n,)
-        Cells of each row, 0 where nobody can say.
+        Cells of each row, 0 or `OPEN` where nobody can say.
     named : bool
         Whether the profile names the columns, not the header.
     """
@@ -77,7 +84,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     first, last = int(at[0]), int(at[-1])
     to_the_end = last >= n - 1 - _SHARE * n
     where = ""
-    if at.size >= _DENSE * (last - first + 1) and not (first == 0 and to_the_end):
+    if at.size >= _FEWEST and at.size >= _DENSE * (last - first + 1) and not (first == 0 and to_the_end):
         until = "on" if to_the_end else f"to {_place(layout.rows, last)}"
         where = f", from {_place(layout.rows, first)} {until}"
         step = (
@@ -99,13 +106,41 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
             "Write a name for every cell of a row into the header, in a copy of the log, or into `columns` of the "
             "source (with `header_lines: 1` for the line that names them now); or correct `separator`."
         )
-    expected = f"the profile names {width} columns" if named else f"the header has {width}"
+    expected = f"the profile names {width} column{'s' if width != 1 else ''}" if named else f"the header has {width}"
     parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
         layout.separator, f" parted by {layout.separator!r}"
     )
-    others = f", and {wrong.size - at.size} have another number" if wrong.size > at.size else ""
-    found = f"{_of_all(at.size, n)} rows have {usual} cells{parted}{where}{others}; {expected}."
+    more = wrong.size - at.size
+    others = f", and {more} {'has' if more == 1 else 'have'} another number" if more else ""
+    has = "has" if at.size == 1 else "have"
+    found = f"{_of_all(at.size, n)} {has} {usual} cell{'s' if usual != 1 else ''}{parted}{where}{others}; {expected}."
     return Misfit(found, step, wrong.size)
+
+
+def quotations_amiss(layout: Layout, count: Index) -> Misfit | None:
+    """Return what is to be said of rows with a quotation that is not closed; None if they are few.
+
+    Parameters
+    ----------
+    layout : Layout
+    count : ndarray of int64, shape (n,)
+        Cells of each row, `OPEN` for these.
+    """
+    n = len(layout.rows)
+    amiss = np.flatnonzero(count == OPEN)
+    if not _many(amiss.size, n):
+        return None
+    one = int(amiss[amiss.size // 2])
+    (text,) = layout.rows.take(np.array([one])).text(limit=_CUT)
+    found = (
+        f"In {_of_all(amiss.size, n, within=True)} a cell begins with a quotation mark that is never closed, such as "
+        f"{text!r} of {_place(layout.rows, one)}; expected a second mark at the end of the cell, in the same line."
+    )
+    step = (
+        "Export the log with a mark at either end of such a cell or with none, and without line ends within a cell; or "
+        "take the marks out of a copy of it."
+    )
+    return Misfit(found, step, amiss.size)
 
 
 def times_amiss(
@@ -137,7 +172,7 @@ def times_amiss(
         if value is not None
     )
     found = (
-        f"The time of {_of_all(unread.size, len(rows)).lower()} rows cannot be read{said}, such as {quoted} of "
+        f"The time of {_of_all(unread.size, len(rows), within=True)} cannot be read{said}, such as {quoted} of "
         f"{_place(rows, one)}."
     )
     return Misfit(found, " ".join([*_advice(list(shown.values()), column), _FORMS]), unread.size)
@@ -145,10 +180,14 @@ def times_amiss(
 
 def _advice(shown: list[str], column: TimeColumn) -> list[str]:
     """Return what to do about a time that stands in one column or, date and time of day apart, in two."""
+    if column.unit is not None and len(shown) == 1 and re.search(DECIMAL_COMMA, shown[0]):
+        return [_COMMA_ADVICE]
     if column.unit is not None:
         return ["This is no number: leave `unit` out of the source's time."] if len(shown) == 1 else []
     known = _ON_CLOCKS if len(shown) > 1 else (*_ON_CLOCKS, *_ON_LONE_COLUMNS)
     advice = [step for form, step in known if re.search(form, shown[-1])]
+    if len(shown) == 1 and re.search(DECIMAL_COMMA, shown[0]):
+        advice.append(_COMMA_ADVICE)
     if column.date_form is None and re.search(_OTHER_DATE, shown[0]):
         advice.append(_DATE_ADVICE)
     return advice
@@ -158,8 +197,13 @@ def _many(amiss: int, n: int) -> bool:
     return 2 * amiss > n or (amiss >= _FEWEST and amiss >= _SHARE * n)
 
 
-def _of_all(some: int, n: int) -> str:
-    return f"All {n}" if some == n else f"{some} of {n}"
+def _of_all(some: int, n: int, *, within: bool = False) -> str:
+    """Return how many of the rows, at the beginning of a sentence or within one."""
+    if n == 1:
+        return "the only row" if within else "The only row"
+    if some == n:
+        return f"all {n} rows" if within else f"All {n} rows"
+    return f"{some} of {n} rows"
 
 
 def _place(rows: Spans, row: int) -> str:

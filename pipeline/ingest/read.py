@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -16,6 +17,7 @@ from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.pipeline.ingest.unset_clock import dated_parts
+from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source, VesselProfile
 
@@ -29,9 +31,13 @@ _ORDINARY, _MANY = ("no_channel", "duplicate", "void"), 0.1
 #: What else to look for where many records are refused for a reason.
 _LOOK_FOR = {
     "clock_back": " Do its records run backwards in time, or stand in another order than that of their times?",
-    "same_instant": " Records of one source share an instant and differ: the times are coarser than the readings. "
-    "Where the log has finer ones, such as the `publish_time` or a field of MCAP messages, name them as the column of "
-    "`time`.",
+    "same_instant": " Records of one source share an instant and differ: the times are coarser than the readings.",
+}
+#: What to do about times that are coarser than the readings, by format; a sentence of NMEA has no other time.
+_FINER_TIMES = {
+    "delimited": " Where the log has a column of finer ones, name it as the column of `time`.",
+    "mcap": " Where the log has finer ones, such as the `publish_time` or a field of MCAP messages, name them as the "
+    "column of `time`.",
 }
 #: Characters of a record that it shows.
 _CUT = 160
@@ -118,7 +124,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         return _decode(log_format, name, file, profile, source)
 
     dated = dated_parts(decoding, source.time if source else None)
-    screen, clocks, summary = Screen(log_format, dated.first_ns), OwnClocks(source), _Summary()
+    screen, clocks, summary = Screen(log_format, dated.first_ns), OwnClocks(source), _Summary(log_format)
     for decoded in dated.parts:
         checked = screen.part(decoded)
         summary.add(checked)
@@ -134,13 +140,26 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
 class _Summary:
     """What all parts of a log together say, for the message where it is nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, log_format: str) -> None:
         self.tally = Tally()
         self.unset: tuple[int, int] | None = None
+        self._format = log_format
+        #: Records that are refused, by reason; values of other records that are, by channel and reason.
+        self._records: Counter[str] = Counter()
+        self._values: Counter[tuple[str, str]] = Counter()
+        #: Values that are kept, by channel.
+        self._kept: Counter[str] = Counter()
 
     def add(self, part: Readings) -> None:
         """Take note of one part."""
         self.tally += part.tally
+        for channel, reason, n in part.rejected.group_by("channel", "reason").len().iter_rows():
+            if channel is None:
+                self._records[reason] += n
+            else:
+                self._values[channel, reason] += n
+        for known in CHANNELS.values():
+            self._kept[known.name] += part.frame[known.column].count()
         if "clock_unset" in part.tally.by_reason:
             unset = part.rejected.filter(pl.col("reason") == "clock_unset")["time_utc_ns"].to_list()
             times = [*(self.unset or ()), *unset]
@@ -149,16 +168,31 @@ class _Summary:
     def notes(self, misfits: tuple[Misfit, ...]) -> list[str]:
         """Return what a log is to be doubted for of which much was refused, other than for what it is no log of."""
         doubts = [f"{misfit.found} {misfit.next_step}" for misfit in misfits]
-        refused = {reason: n for reason, n in self.tally.by_reason.items() if reason not in _ORDINARY}
+        doubts += self._mostly_refused()
+        refused = {reason: n for reason, n in self._records.items() if reason not in _ORDINARY}
         most = max(sorted(refused), key=lambda reason: refused[reason], default="")
         share = refused[most] / self.tally.records_read if most else 0.0
         if share <= _MANY or (most == "malformed" and misfits):
             return doubts
+        finer = _FINER_TIMES.get(self._format, "") if most == "same_instant" else ""
         much = "most" if share > 0.5 else f"{100.0 * share:.0f} %"
         return [
-            f"{refused[most]} refusals, {much} of the log, are {most}: see whether the profile fits it, and `kempf "
-            f"logs rejected`.{_LOOK_FOR.get(most, '')}",
+            f"{refused[most]} of {self.tally.records_read} records, {much} of the log, are refused as {most}: see "
+            f"whether the profile fits it, and `kempf logs rejected`.{_LOOK_FOR.get(most, '')}{finer}",
             *doubts,
+        ]
+
+    def _mostly_refused(self) -> list[str]:
+        """Return which channels lost most of their values for one reason, in records of which others are kept."""
+        offered = Counter(self._kept)
+        for (channel, _), n in self._values.items():
+            offered[channel] += n
+        return [
+            f"Of {offered[channel]} values of {channel} in records of which something is kept, "
+            f"{'all' if n == offered[channel] else n} are refused as {reason}: see whether the profile has the right "
+            "column and unit for it, whether its instrument was off, and `kempf logs rejected`."
+            for (channel, reason), n in sorted(self._values.items())
+            if n > 0.5 * offered[channel]
         ]
 
 
@@ -197,7 +231,7 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
             f"the columns found in it are {', '.join(repr(c) for c in columns) or 'none'}.",
-            f"{advice_on(columns)}"
+            f"{advice_on(columns, source.encoding if source else 'utf-8')}"
             f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. "
             + _SEE_PROFILE,
             {"name": name, "columns": columns, "patterns": [s.match for s in profile.sources]},

@@ -2,14 +2,18 @@
 
 import io
 import math
+import random
 import tarfile
 from datetime import UTC, datetime
 from time import process_time
 
+import numpy as np
 import pytest
 
 from kempf.pipeline.ingest import delimited
+from kempf.pipeline.ingest.quoting import inside_quotes
 from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.spans import lines_of
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile
 
@@ -238,8 +242,31 @@ def test_a_log_of_which_most_is_refused_says_so_first():
     rows = "".join(f"{T}{9 - k}Z,{k + 1},90\n" for k in range(9))
     readings = read("utc,sog,hdg\n" + rows)
     assert readings.tally.by_reason == {"clock_back": 8}
-    assert readings.notes[0].startswith("8 refusals, most of the log, are clock_back")
+    assert readings.notes[0].startswith("8 of 9 records, most of the log, are refused as clock_back")
     assert "backwards" in readings.notes[0]
+
+
+@pytest.mark.parametrize(("bad", "much"), [(100, "all"), (60, "60")])
+def test_a_channel_of_which_most_values_are_refused_is_named_where_the_records_are_kept(bad, much):
+    rows = [row.replace(",1,", ",-9999,") if k < bad else row for k, row in enumerate(rows_of(100))]
+    readings = read("\n".join(["utc,sog,hdg", *rows]))
+    assert readings.tally.records_kept == 100 and readings.tally.by_reason == {"out_of_range": bad}
+    (note,) = readings.notes
+    assert note.startswith(
+        f"Of 100 values of speed_over_ground in records of which something is kept, {much} are refused as out_of_range"
+    )
+
+
+def test_values_that_are_refused_are_no_share_of_the_records():
+    rows = [row.replace(",1,", ",-9999,") if k < 40 else row for k, row in enumerate(rows_of(100))]
+    assert read("\n".join(["utc,sog,hdg", *rows])).notes == ()
+
+
+def test_advice_on_coarse_times_is_that_for_the_format():
+    rows = [f"{T}{k // 5}Z,1,{k}" for k in range(20)]
+    note = read("\n".join(["utc,sog,hdg", *rows])).notes[0]
+    assert note.startswith("16 of 20 records, most of the log, are refused as same_instant") and "coarser" in note
+    assert "column of finer ones" in note and "MCAP" not in note and "publish_time" not in note
 
 
 def test_nothing_that_can_be_read_is_shown_by_a_sample():
@@ -262,9 +289,32 @@ def test_a_separator_behind_the_last_cell_is_read_in_rows_in_the_header_and_in_b
 
 
 def test_a_last_cell_that_is_empty_for_once_is_no_separator_too_many():
-    readings = read(f"utc,sog,hdg\n{T}1Z,1,\n{T}2Z,1,\n{T}3Z,1,90,\n{T}4Z,1,90\n")
-    assert readings.frame["heading_rad"].to_list() == [None, None, math.radians(90)]
-    assert readings.rejected["record"].to_list() == [2]
+    readings = read(f"utc,sog,hdg\n{T}1Z,1,\n{T}2Z,1,\n{T}3Z,1,90,\n{T}4Z,1,90\n{T}5Z,1,90,,\n{T}6Z,1,90,7\n")
+    assert readings.frame["heading_rad"].to_list() == [None, None, math.radians(90), math.radians(90)]
+    assert readings.rejected["record"].to_list() == [4, 5]
+
+
+@pytest.mark.parametrize("sign", [",", "\t"])
+@pytest.mark.parametrize(
+    ("header", "some", "more"), [("", "", ","), ("", ',""', ", "), (",", "", ","), (",,", "", ",,")]
+)
+def test_rows_with_and_without_a_separator_behind_the_last_cell_stand_in_one_file(header, some, more, sign):
+    lines = [f"utc,sog,hdg{header}", *rows_of(30, 0, some), *rows_of(50, 30, more), "2025-05-03T08:00:00Z,1"]
+    readings = read("\n".join(lines).replace(",", sign))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(k) for k in range(80)]
+    assert readings.tally.by_reason == {"malformed": 1}
+
+
+def test_a_message_has_the_number_of_columns_of_the_header_itself():
+    lines = ["utc,sog,hdg", *rows_of(30, 0, ","), *rows_of(25, 30, ",7,8")]
+    assert "25 of 55 rows have 5 cells" in (note := read("\n".join(lines)).notes[0]) and "the header has 3." in note
+
+
+def test_a_column_without_a_name_may_be_the_first_as_pandas_writes_an_index():
+    lines = ["\tutc\tsog\thdg", *(f"{k}\t{T}{k}Z\t1\t{k}" for k in range(9))]
+    readings = read("\n".join(lines))
+    assert readings.frame["heading_rad"].to_list() == [math.radians(k) for k in range(9)]
+    assert delimited.titled("\n".join(lines).encode()) is None
 
 
 @pytest.mark.parametrize(
@@ -356,7 +406,7 @@ def test_an_hour_of_one_digit_beside_hours_of_two_costs_no_row():
     readings = read(text)
     assert (readings.frame["time_utc_ns"][1] - readings.frame["time_utc_ns"][0]) == 10**9
     assert readings.rejected["record"].to_list() == [2, 3]
-    assert readings.notes == ("Times without a zone are taken as UTC.",)
+    assert readings.notes[1:] == ("Times without a zone are taken as UTC.",)
 
 
 @pytest.mark.parametrize(
@@ -392,6 +442,20 @@ def test_a_block_of_nul_bytes_costs_one_row_wherever_it_stands(place, length):
     assert readings.tally.records_read == 200
 
 
+@pytest.mark.parametrize("title", [[], ["KVLCC2, a trial"]])
+def test_a_block_of_nul_bytes_that_ends_a_line_before_the_header_is_no_header(title):
+    data = "\n".join(["\0" * 600, *title, "utc,sog,hdg", *rows_of(9), "\0" * 16, *rows_of(9, 9)]).encode()
+    readings = read(data, profile(header_lines=len(title)))
+    assert readings.rejected["record"].to_list() == [9] and readings.tally.records_kept == 18
+    assert delimited.titled(data) is None or delimited.titled(data).header_lines == len(title)
+
+
+def test_a_block_of_nul_bytes_is_a_row_where_no_header_stands_before_the_rows():
+    data = "\n".join(["\0" * 600, *rows_of(9)])
+    readings = read(data, profile(columns=["utc", "sog", "hdg"]))
+    assert readings.rejected["record"].to_list() == [0] and readings.tally.records_kept == 9
+
+
 @pytest.mark.parametrize("data", [bytes(100), b"\0\n" * 99, bytes(50_000) + b"\x01\x02,\x03\n" * 9, b"a,b\0\n" * 99])
 def test_other_bytes_with_nul_among_them_are_no_text(data):
     with pytest.raises(DataRejected) as error:
@@ -419,7 +483,7 @@ def test_a_column_that_was_added_on_the_way_is_noted_with_the_row_from_which_on(
     assert readings.tally.by_reason == {"malformed": 401}
     (note,) = readings.notes
     assert note.startswith(
-        "400 of 1001 rows have 4 cells parted by ',', from row 601 (line 603) on, and 1 have another number; the "
+        "400 of 1001 rows have 4 cells parted by ',', from row 601 (line 603) on, and 1 has another number; the "
         "header has 3. Columns were added"
     )
 
@@ -456,3 +520,77 @@ def test_a_few_damaged_rows_are_counted_and_not_noted():
     lines[100:1100:50] = [row + ",7" for row in lines[100:1100:50]]
     readings = read("\n".join(["utc,sog,hdg", *lines]))
     assert readings.tally.by_reason == {"malformed": 20} and readings.notes == ()
+
+
+def test_one_row_is_no_stretch_at_which_a_log_is_to_be_cut():
+    (note,) = read(f"utc,sog,hdg\n{T}1Z,1,90\n{T}2Z\n{T}3Z,2,91,4,5\n").notes[:1]
+    assert note.startswith("1 of 3 rows has 1 cell parted by ',', and 1 has another number; the header has 3.")
+    assert "cut the log" not in note
+    with pytest.raises(DataRejected, match=r"The only row has 1 cell parted by ','; the header has 3\."):
+        read(f"utc,sog,hdg\n{T}2Z\n")
+
+
+@pytest.mark.parametrize("unit", ["s", None])
+def test_a_time_with_a_decimal_comma_is_reported_as_one(unit):
+    text = "utc;sog;hdg\n" + "".join(f"{k},5;1;90\n" for k in range(9))
+    with pytest.raises(DataRejected) as error:
+        read(text, profile(None, {"column": "utc", **({"unit": unit} if unit else {})}))
+    assert "`decimal: ','`" in error.value.next_step and "leave `unit` out" not in error.value.next_step
+
+
+INCHES, NOTE = '5",6"', '5"'
+
+
+@pytest.mark.parametrize(
+    ("names", "more"), [("a,b", INCHES), ("note", NOTE), ("a", ' 5" of "x"'), ("a,b", '"a, b", 5"')]
+)
+def test_a_quotation_mark_within_a_cell_is_text(names, more):
+    readings = read("\n".join([f"utc,sog,hdg,{names}", *rows_of(30, 0, f",{more}")]))
+    assert readings.frame.height == 30 and readings.notes == ()
+
+
+def test_quotations_that_are_never_closed_are_reported_as_such():
+    rows = [*rows_of(10), *rows_of(30, 10, ',"open')]
+    with pytest.raises(DataRejected) as error:
+        read("\n".join(["utc,sog,hdg,note", *rows[10:]]))
+    assert "In all 30 rows a cell begins with a quotation mark that is never closed, such as" in error.value.message
+    assert "of row 16 (line 17); expected a second mark" in error.value.message
+    assert error.value.next_step.startswith("Export the log with a mark at either end")
+    assert "In 30 of 40 rows" in read("\n".join(["utc,sog,hdg", *rows])).notes[0]
+
+
+def _by_steps(row, sign):
+    """Return the cells of a row, None where a quotation is not closed, character by character."""
+    cells, state = [""], "begin"
+    for c in row:
+        if state == "quoted":
+            state = "closed" if c == '"' else "quoted"
+        elif state == "closed" and c == '"':
+            state = "quoted"
+        elif c == sign:
+            cells.append("")
+            state = "begin"
+            continue
+        elif state == "begin" and c == '"':
+            state = "quoted"
+        elif not (state == "begin" and c in " \t"):
+            state = "text"
+        cells[-1] += c
+    return None if state == "quoted" else cells
+
+
+@pytest.mark.parametrize("sign", [",", "\t", ";"])
+def test_quotations_in_columns_are_those_character_by_character(sign):
+    chance = random.Random(7)
+    rows = ["".join(chance.choices('"" a' + 2 * sign, k=chance.randint(1, 12))) for _ in range(4000)]
+    data = ("\n".join(rows)).encode()
+    inside, closed = inside_quotes(
+        np.frombuffer(data, dtype=np.uint8), lines_of(np.frombuffer(data, dtype=np.uint8)), sign
+    )
+    at = 0
+    for row, whole in zip(rows, closed, strict=True):
+        expected = _by_steps(row, sign)
+        assert whole == (expected is not None), row
+        if expected is not None:
+            assert sum(c == sign and not inside[at + k] for k, c in enumerate(row)) == len(expected) - 1, row
+        at += len(row) + 1

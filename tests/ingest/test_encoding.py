@@ -77,3 +77,11 @@ def test_a_draft_names_the_encoding_by_which_it_shows_the_names(tmp_path: Path) 
     for data in (text.encode(), *wide(text)):
         log.write_bytes(data)
         assert "encoding" not in draft(log) and '"Kurs [°]"' in draft(log)
+
+
+def test_names_that_are_not_in_the_encoding_of_the_profile_are_reported_with_it() -> None:
+    data = f"utc,sog,Kurs [°]\n{T}1Z,10,90\n".encode()
+    channels = {"Kurs [°]": {"channel": "heading", "unit": "deg"}}
+    with pytest.raises(DataRejected) as error:
+        read_log("log.csv", data, profile(channels, encoding="ascii"))
+    assert error.value.next_step.startswith("The names are not in ascii: correct `encoding`")

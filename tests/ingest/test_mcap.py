@@ -81,7 +81,9 @@ def test_times_coarser_than_the_messages_are_named_with_where_finer_ones_may_be(
     # written once a second by the recorder
     readings = read(write([(topic, float(int(seconds)), payload) for topic, seconds, payload in plain()]))
     refused = readings.tally.by_reason["same_instant"]
-    assert refused > 100 and readings.notes[0].startswith(f"{refused} refusals, most of the log, are same_instant")
+    assert refused > 100 and readings.notes[0].startswith(
+        f"{refused} of {readings.tally.records_read} records, most of the log, are refused as same_instant"
+    )
     assert "`publish_time`" in readings.notes[0]
     assert read(write(plain())).notes == ()
 

@@ -216,6 +216,10 @@ class Cells:
         return value
 
 
+#: A number with a comma before its decimals, as a regular expression: what is before the comma, and what is behind it.
+DECIMAL_COMMA = r"^([+-]?\d*),(\d+(?:[eE][+-]?\d+)?)$"
+
+
 def number(text: pl.Series) -> Float:
     """Convert decimal text to numbers.
 
