@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from datetime import UTC, datetime
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series
+from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series, written
 from kempf.schemas.enumeration import listed
 
 #: Shortest gap that is named, s, and in periods of the channel.
@@ -67,10 +66,10 @@ def _longer(gap: Nanoseconds, silent: Nanoseconds, period_s: float) -> bool:
 def _where(gaps: Nanoseconds) -> str:
     lasting = (gaps[:, 1] - gaps[:, 0]) / SECOND_NS
     longest = int(np.argmax(lasting))
-    since = datetime.fromtimestamp(int(gaps[longest, 0]) // SECOND_NS, UTC).strftime("%Y-%m-%d %H:%M:%S")
+    since = written(gaps[longest, 0])
     if len(gaps) == 1:
-        return f"for {lasting[0]:.0f} s from {since} UTC on"
+        return f"for {lasting[0]:.0f} s from {since} on"
     return (
         f"in {len(gaps)} gaps of {lasting.sum():.0f} s together, the longest of {lasting[longest]:.0f} s "
-        f"from {since} UTC on"
+        f"from {since} on"
     )

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Series
+from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Series, written
 from kempf.schemas.channels import CHANNELS
 
 #: readings on either side of one: a leap of up to so many is none of their median
@@ -104,6 +102,5 @@ def said(name: str, series: Series, found: Mask) -> str:
     """Return how many readings of a channel leap, with the first of them, in one sentence."""
     first = int(np.argmax(found))
     unit = CHANNELS[name].unit.replace("rad", "deg")
-    clock = datetime.fromtimestamp(int(series.time_utc_ns[first]) // SECOND_NS, UTC).strftime("%Y-%m-%d %H:%M:%S")
-    shown = f"{np.rad2deg(series.value[first]):.4g} {unit} at {clock} UTC"
+    shown = f"{np.rad2deg(series.value[first]):.4g} {unit} at {written(series.time_utc_ns[first])}"
     return f"{counted(name, int(np.count_nonzero(found)))}; the first is {shown}"

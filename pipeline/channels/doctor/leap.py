@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
@@ -12,7 +10,7 @@ from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series, written
 
 #: The heading of so many readings, and of so long, s, is compared with that of as many before.
 _READINGS, _LEAST_S = 3, 2.5
@@ -65,8 +63,8 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         words = "the heading does not leap while the ship is steady"
         return [Outcome("heading_leap", _CHANNELS, "agree", words, (figure,), alone=True)]
     at = int(heading.time_utc_ns[k])
-    clock = datetime.fromtimestamp(at // SECOND_NS, UTC).isoformat(sep=" ", timespec="seconds").removesuffix("+00:00")
-    words = f"the heading leaps by {np.rad2deg(leaps[k]):+.1f} deg at {clock} UTC, which the yaw rate does not show"
+    size = f"{np.rad2deg(leaps[k]):+.1f} deg"
+    words = f"the heading leaps by {size} at {written(at)}, which the yaw rate does not show"
     fault = Fault("leap", ("heading",), float(leaps[k]), start_utc_ns=at)
     return [Outcome("heading_leap", _CHANNELS, "disagree", words, (figure,), 1.0, (fault,))]
 

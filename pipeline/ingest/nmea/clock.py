@@ -11,6 +11,7 @@ from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
 from kempf.pipeline.ingest.nmea.logger_clock import LoggerTimes, are_coarse, on_utc, spread
 from kempf.pipeline.ingest.nmea.receiver import fixes_of_one, speaking
+from kempf.pipeline.ingest.nmea.shares import shares_of
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
@@ -362,12 +363,10 @@ def _spread(
     distance = np.clip(distance, 0, _PAUSE * usual)
     at = np.searchsorted(fix, record) if follows else np.searchsorted(fix, record) - 1
     epoch = epoch_of_fix[np.clip(at, 0, fix.size - 1)]
-    order = np.argsort(source, kind="stable")
-    heads = np.flatnonzero(np.concatenate(([True], (np.diff(source[order]) != 0) | (np.diff(epoch[order]) != 0))))
-    count = np.diff(heads, append=record.size)
-    shared, place = np.repeat(count, count), np.arange(record.size) - np.repeat(heads, count)
-    step = distance[epoch[order]] // shared
+    shares = shares_of(source, epoch)
+    shared, place = shares.shared, shares.place
+    step = distance[epoch[shares.order]] // shared
     result = np.empty((2, record.size), dtype=np.int64)
-    result[0, order] = (place - (shared - 1)) * step if follows else place * step
-    result[1, order] = shared
+    result[0, shares.order] = (place - (shared - 1)) * step if follows else place * step
+    result[1, shares.order] = shared
     return result[0], result[1]

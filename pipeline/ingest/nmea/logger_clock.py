@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
+from kempf.pipeline.ingest.nmea.receiver import ARRIVES_NS
+from kempf.pipeline.ingest.nmea.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
@@ -21,8 +23,6 @@ _TOGETHER_NS, _IN_BURSTS = SECOND_NS // 50, 0.5
 _SAMPLE = 20_000
 #: A burst brings what came since the one before, if that is no longer ago than so many usual distances.
 _USUAL = 1.5
-#: Receivers send a fix up to a second after its instant, and never before; what rounding leaves before it, ns.
-_LATEST_NS, _EARLIEST_NS = SECOND_NS, -SECOND_NS // 10
 #: A receiver that sends so late, or a clock that is so far off or leaps so far, is worth a note, ns.
 _WORTH_NS = SECOND_NS // 2
 #: Fixes that can put a clock right: one may have waited.
@@ -87,9 +87,8 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
     # most logs have none, which their first lines show
     if not whole and _usual(own[:_SAMPLE], burst[:_SAMPLE], begun[:_SAMPLE]) is None:
         return LoggerTimes(stamp_ns)
-    order, heads, count = _grouped(own, burst)
-    came = begun[order]
-    shared, place = np.repeat(count, count), np.arange(record.size) - np.repeat(heads, count)
+    shares = shares_of(own, burst)
+    shared, came = shares.shared, begun[shares.order]
     if whole:
         lasting, ends = np.full(record.size, SECOND_NS), came + SECOND_NS
         note = (
@@ -100,25 +99,17 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
         usual = _usual(own, burst, begun)
         if usual is None:
             return LoggerTimes(stamp_ns)
-        since = np.concatenate(([usual], np.diff(came[heads])))
+        since = np.concatenate(([usual], np.diff(came[shares.heads])))
         since[(since <= 0) | (since > _USUAL * usual)] = usual  # another source, a pause, one that speaks seldom
-        lasting, ends = np.repeat(since, count), came
+        lasting, ends = np.repeat(since, shares.count), came
         note = (
             f"The log's sentences come in bursts, every {usual / SECOND_NS:.3g} s (median): they were spread evenly "
             "over the time since the burst before."
         )
     result = stamp_ns.copy()
     # each in the middle of its share of the time
-    result[record[order]] = ends - (2 * (shared - place) - 1) * lasting // (2 * shared)
+    result[record[shares.order]] = ends - (2 * (shared - shares.place) - 1) * lasting // (2 * shared)
     return LoggerTimes(result, (note,))
-
-
-def _grouped(source: Index, burst: Index) -> tuple[Index, Index, Index]:
-    """Return the lines by source and burst, where each burst of a source begins among them, and how many it has."""
-    order = np.lexsort((burst, source))
-    opens = (np.diff(source[order]) != 0) | (np.diff(burst[order]) != 0)
-    heads = np.flatnonzero(np.concatenate(([True], opens)))
-    return order, heads, np.diff(heads, append=source.size)
 
 
 def _usual(source: Index, burst: Index, came_ns: Nanoseconds) -> int | None:
@@ -129,8 +120,9 @@ def _usual(source: Index, burst: Index, came_ns: Nanoseconds) -> int | None:
     source, burst, came_ns : ndarray of int64, shape (m,)
         Of every line: where it comes from, in which burst, and when that began.
     """
-    order, heads, count = _grouped(source, burst)
-    source, came_ns = source[order][heads], came_ns[order][heads]
+    shares = shares_of(source, burst)
+    first, count = shares.order[shares.heads], shares.count
+    source, came_ns = source[first], came_ns[first]
     distances = []
     for one in np.unique(source):
         of_it = source == one
@@ -168,10 +160,11 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     notes = [f"The receiver's time leaps or stands still at {leapt} of its fixes: the stamps are kept there."] * (
         leapt > 0
     )
+    earliest, latest = ARRIVES_NS
     if at.size < _FEWEST:
         few = f"The logger's stamps are {size}, by {at.size} of its fixes: too few to put them right."
-        return LoggerTimes(stamp_ns, () if _EARLIEST_NS <= usual <= _WORTH_NS else (few,))
-    if lead.min() >= _EARLIEST_NS and lead.max() <= _LATEST_NS:
+        return LoggerTimes(stamp_ns, () if earliest <= usual <= _WORTH_NS else (few,))
+    if lead.min() >= earliest and lead.max() <= latest:
         late = f"The logger's stamps are {size}: its clock may be off, or the receiver sends so late. They were kept."
         return LoggerTimes(stamp_ns, (*notes, *([late] if usual > _WORTH_NS else [])))
     (record,) = np.nonzero(stamp_ns != NO_TIME)

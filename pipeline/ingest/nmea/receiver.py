@@ -16,8 +16,9 @@ from kempf.schemas.nmea import SATELLITES
 _SILENT = 3
 #: A clock that differs by more than this from the one that counts is another one, ns.
 _DIFFERS_NS = SECOND_NS // 2
-#: Fixes arrive so long after their instants by a clock that is set, ns.
-_ARRIVES_NS = (-SECOND_NS // 10, SECOND_NS)
+#: How long after its instant a fix arrives by a clock that is set, ns: up to a second, and never before it but for what
+#: rounding leaves.
+ARRIVES_NS = (-SECOND_NS // 10, SECOND_NS)
 #: The sentence that brings position, velocity, time and date together.
 _FIX = "RMC"
 
@@ -79,7 +80,7 @@ def fixes_of_one(frames: Frames, dated: Flag, late_ns: Nanoseconds) -> tuple[Fla
     lates = {name: float(np.median(late_ns[dated & _of_address(frames, [name])])) for name in _frequent(frames, dated)}
     if not lates:
         return np.zeros(dated.size, dtype=np.bool_), []
-    low, high = _ARRIVES_NS
+    low, high = ARRIVES_NS
     set_by_it = {name: late for name, late in lates.items() if low <= late <= high}
     first = min(set_by_it or lates, key=lambda name: (lates[name], name))
     notes = [
