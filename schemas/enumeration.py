@@ -1,4 +1,4 @@
-"""Names in a sentence."""
+"""Names and words in a sentence."""
 
 from __future__ import annotations
 
@@ -8,3 +8,25 @@ from collections.abc import Sequence
 def listed(names: Sequence[str]) -> str:
     """Return at least one name as words: a, b and c."""
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def first_of(names: Sequence[str], most: int) -> str:
+    """Return the first of some names as words, and that there are more.
+
+    Examples
+    --------
+    >>> first_of(["HEHDT", "AGRSA", "IIVHW"], 2)
+    'HEHDT, AGRSA ...'
+    """
+    return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
+
+
+def at_the_beginning(words: str) -> str:
+    """Return words as a sentence begins with them; what stands behind their first letter stays.
+
+    Examples
+    --------
+    >>> at_the_beginning("lever arm of the GNSS antenna")
+    'Lever arm of the GNSS antenna'
+    """
+    return words[:1].upper() + words[1:]

@@ -18,7 +18,7 @@ from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.pipeline.diagnose.verdict import share_explained, share_of_given, verdict
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.median_error import median_error
-from kempf.schemas.enumeration import listed
+from kempf.schemas.enumeration import at_the_beginning, listed
 
 #: share of the misfit below which nothing of it is explained
 _LEAST_SHARE = 0.005
@@ -52,7 +52,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
         size = sized_by_refit(candidate.effect, best)
-        lines.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
+        lines.append(f"{at_the_beginning(size)}: {NOT_EXPLAINED}.")
     for immaterial in diagnosis.immaterial:
         (candidate, best), *_ = immaterial.chosen_from
         lines.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(immaterial)}.")
@@ -112,10 +112,10 @@ def _moving_the_hull(diagnosis: Diagnosis) -> list[str]:
             continue
         weight = weighed(before.ahead, step.ahead, before.fit, step.fit)
         if weight.fall <= LEAST_PART and weight.shift > LEAST_SHIFT:
-            title = f"{step.added.title[:1].upper()}{step.added.title[1:]}"
             lines.append(
-                f"{title} hardly changes a prediction one leg ahead ({-100.0 * weight.fall:+.1f} % of the misfit), but "
-                f"without it a parameter of the hull is off by {100.0 * weight.shift:.0f} %."
+                f"{at_the_beginning(step.added.title)} hardly changes a prediction one leg ahead "
+                f"({-100.0 * weight.fall:+.1f} % of the misfit), but without it a parameter of the hull is off by "
+                f"{100.0 * weight.shift:.0f} %."
             )
     return lines
 
@@ -135,7 +135,7 @@ def _together(diagnosis: Diagnosis) -> list[str]:
     sets = dict.fromkeys(step.together for step in diagnosis.steps if step.together)
     words = [listed([titles[name] for name in names]) for names in sets]
     return [
-        f"{phrase[:1].upper()}{phrase[1:]} belong together: each of them alone makes no prediction clearly better. "
+        f"{at_the_beginning(phrase)} belong together: each of them alone makes no prediction clearly better. "
         "They were chosen by manoeuvres left out, and the held-out ones, which had no part in the choice, confirm them."
         for phrase in words
     ]

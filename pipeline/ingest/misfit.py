@@ -12,6 +12,7 @@ from kempf.pipeline.ingest.decoded import Misfit
 from kempf.pipeline.ingest.layout import Layout
 from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA
+from kempf.schemas.enumeration import at_the_beginning
 from kempf.schemas.profile import TimeColumn
 
 #: Damage is a few rows here and there: of so many, and of such a share, the layout is to blame.
@@ -113,7 +114,8 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     more = wrong.size - at.size
     others = f", and {more} {'has' if more == 1 else 'have'} another number" if more else ""
     has = "has" if at.size == 1 else "have"
-    found = f"{_of_all(at.size, n)} {has} {usual} cell{'s' if usual != 1 else ''}{parted}{where}{others}; {expected}."
+    rows = at_the_beginning(_of_all(at.size, n))
+    found = f"{rows} {has} {usual} cell{'s' if usual != 1 else ''}{parted}{where}{others}; {expected}."
     return Misfit(found, step, wrong.size)
 
 
@@ -133,7 +135,7 @@ def quotations_amiss(layout: Layout, count: Index) -> Misfit | None:
     one = int(amiss[amiss.size // 2])
     (text,) = layout.rows.take(np.array([one])).text(limit=_CUT)
     found = (
-        f"In {_of_all(amiss.size, n, within=True)} a cell begins with a quotation mark that is never closed, such as "
+        f"In {_of_all(amiss.size, n)} a cell begins with a quotation mark that is never closed, such as "
         f"{text!r} of {_place(layout.rows, one)}; expected a second mark at the end of the cell, in the same line."
     )
     step = (
@@ -172,8 +174,7 @@ def times_amiss(
         if value is not None
     )
     found = (
-        f"The time of {_of_all(unread.size, len(rows), within=True)} cannot be read{said}, such as {quoted} of "
-        f"{_place(rows, one)}."
+        f"The time of {_of_all(unread.size, len(rows))} cannot be read{said}, such as {quoted} of {_place(rows, one)}."
     )
     return Misfit(found, " ".join([*_advice(list(shown.values()), column), _FORMS]), unread.size)
 
@@ -197,13 +198,11 @@ def _many(amiss: int, n: int) -> bool:
     return 2 * amiss > n or (amiss >= _FEWEST and amiss >= _SHARE * n)
 
 
-def _of_all(some: int, n: int, *, within: bool = False) -> str:
-    """Return how many of the rows, at the beginning of a sentence or within one."""
+def _of_all(some: int, n: int) -> str:
+    """Return how many of the rows, in words."""
     if n == 1:
-        return "the only row" if within else "The only row"
-    if some == n:
-        return f"all {n} rows" if within else f"All {n} rows"
-    return f"{some} of {n} rows"
+        return "the only row"
+    return f"all {n} rows" if some == n else f"{some} of {n} rows"
 
 
 def _place(rows: Spans, row: int) -> str:

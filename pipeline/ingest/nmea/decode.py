@@ -12,8 +12,9 @@ from kempf.pipeline.ingest.nmea.clock import clock_of
 from kempf.pipeline.ingest.nmea.compass_and_rudder import both_rudders, make_true
 from kempf.pipeline.ingest.nmea.fields import Said, read_type
 from kempf.pipeline.ingest.nmea.frames import Frames, frames_of
-from kempf.pipeline.ingest.nmea.unsummed import unsummed_notes
+from kempf.pipeline.ingest.nmea.unsummed import NAMED, unsummed_notes
 from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
+from kempf.schemas.enumeration import first_of
 from kempf.schemas.nmea import SENTENCES
 
 #: Channel -> address of the sentence -> factor on the value in SI, and offset in SI.
@@ -107,8 +108,7 @@ def _notes(frames: Frames, kind: Index, reason: Code) -> list[str]:
         used = sorted(frames.names[code] for code in np.flatnonzero(count))
         own = int(sum(count[code] for code, name in enumerate(frames.names) if name.startswith("P")))
         encapsulated = int(np.sum(without & (_opening(frames) == ord("!"))))
-        shown = ", ".join(used[:12]) + (" ..." if len(used) > 12 else "")
         kinds = [f"{n} {label}" for n, label in ((own, "proprietary"), (encapsulated, "AIS or encapsulated")) if n]
         behind = f"; of them {', '.join(kinds)}" if kinds else ""
-        notes.append(f"Sentences without a channel: {shown}{behind}.")
+        notes.append(f"Sentences without a channel: {first_of(used, NAMED)}{behind}.")
     return notes

@@ -7,12 +7,13 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import Flag
 from kempf.pipeline.ingest.nmea.frames import Frames
 from kempf.pipeline.ingest.spans import first_within
+from kempf.schemas.enumeration import first_of
 
 #: Share of an instrument's sentences from which it is the instrument, not the line, that damages them.
 _MOST = 0.5
 
-#: Instruments that a note names.
-_NAMED = 12
+#: Addresses that a note names.
+NAMED = 12
 
 
 def unsummed_notes(frames: Frames, read: Flag) -> list[str]:
@@ -36,9 +37,8 @@ def unsummed_notes(frames: Frames, read: Flag) -> list[str]:
         at = refused[flag]
         if at.size:
             names = sorted(frames.names[code] for code in np.unique(frames.address[at]))
-            shown = ", ".join(names[:_NAMED]) + (" ..." if len(names) > _NAMED else "")
             notes.append(
-                f"{at.size} sentences {shown} have {lack} and were refused: a sentence counts only with its right "
-                "checksum. Let the instrument or the logger write it."
+                f"{at.size} sentences {first_of(names, NAMED)} have {lack} and were refused: a sentence counts only "
+                "with its right checksum. Let the instrument or the logger write it."
             )
     return notes
