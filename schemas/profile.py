@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from datetime import datetime
+from datetime import UTC, datetime
 from fnmatch import fnmatch
 from typing import Any, ClassVar, Literal
 
@@ -29,8 +29,12 @@ from kempf.schemas.faults import faults_of
 from kempf.schemas.frozen import Frozen
 from kempf.schemas.units import factor_to_si
 
-#: yyyy or yy, mm and dd in any order, with one sign between them or none
-_DATE_FORM = re.compile(r"(?=.*y)(?=.*m)(?=.*d)(?:yyyy|yy|mm|dd)([-./ ]?)(?:yyyy|yy|mm|dd)\1(?:yyyy|yy|mm|dd)")
+#: From here on spreadsheets count days, those of old Macintosh computers from the second.
+_SPREADSHEETS = (datetime(1899, 12, 30, tzinfo=UTC), datetime(1904, 1, 1, tzinfo=UTC))
+
+#: yyyy or yy, mm or mmm, and dd in any order, with one sign between them or none
+_PART = r"(?:yyyy|yy|mmm|mm|dd)"
+_DATE_FORM = re.compile(rf"(?=.*y)(?=.*m)(?=.*d){_PART}([-./ ]?){_PART}\1{_PART}")
 
 
 class _Grown(Frozen):
@@ -89,11 +93,11 @@ class TimeColumn(_Grown):
     #: date, time: columns of the date and of the time of day, where they stand apart
     date: str | None = None
     time: str | None = None
-    #: how the date is written, such as dd.mm.yyyy, in its own column or before the time of day in that of the whole
-    #: instant; None for ISO 8601, yyyy-mm-dd or yyyymmdd
+    #: how the date is written, such as dd.mm.yyyy or dd-mmm-yyyy, in its own column or before the time of day in that
+    #: of the whole instant; None for ISO 8601, yyyy-mm-dd or yyyymmdd
     date_form: str | None = None
-    #: None for ISO 8601 text; else the unit of an elapsed or epoch number, or of seconds since midnight
-    unit: Literal["s", "ms", "us", "ns"] | None = None
+    #: None for ISO 8601 text; else the unit of an elapsed or epoch number, or of the time since midnight
+    unit: Literal["s", "ms", "us", "ns", "d"] | None = None
     #: start of the elapsed time; without it a number counts from 1970-01-01 UTC
     start: AwareDatetime | None = None
     #: seconds between two rows, where they are evenly spaced and the column is too coarse or not there
@@ -104,15 +108,21 @@ class TimeColumn(_Grown):
     @field_validator("start")
     @classmethod
     def _of_our_time(cls, value: datetime | None) -> datetime | None:
-        if value is not None and not 1970 <= value.year < 2200:
-            raise ValueError("start lies between the years 1970 and 2200")
+        if value is not None and not (1970 <= value.year < 2200 or value in _SPREADSHEETS):
+            raise ValueError(
+                "start lies between the years 1970 and 2200, or is 1899-12-30T00:00:00Z or 1904-01-01T00:00:00Z, from "
+                "which spreadsheets count days"
+            )
         return value
 
     @field_validator("date_form")
     @classmethod
     def _a_form(cls, value: str | None) -> str | None:
         if value is not None and not _DATE_FORM.fullmatch(value):
-            raise ValueError("date_form has yyyy or yy, mm and dd, once each, such as dd.mm.yyyy, mm/dd/yyyy or ddmmyy")
+            raise ValueError(
+                "date_form has yyyy or yy, mm or mmm (the month's English name), and dd, once each, such as "
+                "dd.mm.yyyy, mm/dd/yyyy, dd-mmm-yyyy or ddmmyy"
+            )
         return value
 
     @model_validator(mode="after")
@@ -127,6 +137,8 @@ class TimeColumn(_Grown):
             raise ValueError(
                 "date_form is that of the column date, or of a column of date and time of day without unit"
             )
+        if self.unit == "d" and self.date is None and self.start is None:
+            raise ValueError("days count from a start: give it, for those of a spreadsheet 1899-12-30T00:00:00Z")
         if self.column is None and self.date is None and self.interval_s is None and self.start is None:
             raise ValueError("give column, or date and time, or interval_s")
         return self

@@ -15,6 +15,7 @@ import polars as pl
 from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.holds import find_held
+from kempf.pipeline.channels.second_instrument import difference
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.channels.there_and_back import LEAPING, leaps, said
 from kempf.schemas.channels import CHANNELS
@@ -90,12 +91,13 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
             # messages of their own, such as a topic for the speed and one for the course
             groups += [(name,) for name in group if len(group) > 1]
             continue
-        source = _choose(dict(offered.select("source", _name(group)).iter_rows()), group, notes)
-        rows = frame.filter(pl.col("source") == source).select("time_utc_ns", *_columns(group)).drop_nulls().collect()
-        time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
-        values = rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
-        del rows
-        channels, std_s = _at_instants(group, time, values, source, notes)
+        source, others = _choose(dict(offered.select("source", _name(group)).iter_rows()))
+        held: list[str] = []
+        channels, std_s = _at_instants(group, *_of_one(frame, source, group), source, held)
+        if others:
+            also = (_also(frame, other, group, channels) for other in others)
+            notes.append(f"{' and '.join(group)} from {source}; also in {', '.join(also)}, not used")
+        notes += held
         series |= channels
         sources |= dict.fromkeys(channels, source)
         if std_s > 0.0:
@@ -145,17 +147,35 @@ def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
     )
 
 
-def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) -> str:
-    """Name the source that is nearest to the instrument; among equals that with most readings, then by name."""
+def _of_one(frame: pl.LazyFrame, source: str, group: tuple[str, ...]) -> tuple[Nanoseconds, Float]:
+    """Return the instants, shape (n,), and the values, shape (n, channels), of one source."""
+    rows = frame.filter(pl.col("source") == source).select("time_utc_ns", *_columns(group)).drop_nulls().collect()
+    time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
+    return time, rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
+
+
+def _also(frame: pl.LazyFrame, source: str, group: tuple[str, ...], chosen: dict[str, Series]) -> str:
+    """Name a source that does not serve a group, and by how much it differs from the one that does."""
+    # two antennas are two places
+    if "latitude" in group:
+        return source
+    channels, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
+    found = {name: difference(name, chosen[name], channels[name]) for name in group}
+    differ = "; ".join(f"{name} {words}" if len(group) > 1 else words for name, words in found.items() if words)
+    return f"{source} ({differ})" if differ else source
+
+
+def _choose(counts: dict[str, int]) -> tuple[str, list[str]]:
+    """Name the source that is nearest to the instrument; among equals that with most readings, then by name.
+
+    The others come second.
+    """
     most = max(counts.values())
     enough = {name: many for name, many in counts.items() if many >= _ENOUGH * most}
     best = min(map(_remoteness, enough))
     equal = {name: many for name, many in enough.items() if _remoteness(name) == best}
     chosen = min(name for name, many in equal.items() if many >= _AS_MANY * max(equal.values()))
-    others = [name for name in counts if name != chosen]
-    if others:
-        notes.append(f"{' and '.join(group)} from {chosen}; also in {', '.join(others)}, not used")
-    return chosen
+    return chosen, [name for name in counts if name != chosen]
 
 
 def _remoteness(source: str) -> tuple[bool, bool, bool]:

@@ -35,7 +35,6 @@ _FORMS = (
 
 #: What to do about a time of day, by how it is written, and about a column that says nothing but this.
 _ON_CLOCKS = (
-    (r"(?i)\d ?[ap]\.?m\.?$", "Export the log with a 24-hour clock, without AM and PM."),
     (
         r"\d:\d\d:\d\d:\d+",
         "Write a point before the decimals of a second, in a copy of the log or in the settings of its logger.",
@@ -53,14 +52,14 @@ _ON_LONE_COLUMNS = (
     ),
     (
         r"^[+-]?\d+([.,]\d+)?([eE][+-]?\d+)?$",
-        "This is a number: write its `unit` (s, ms, us or ns) into the source's time and, unless it counts from 1970, "
-        "its `start`. Days, as spreadsheets count them, are none of these: export them as dates.",
+        "This is a number: write its `unit` (s, ms, us, ns, or d for days) into the source's time and, unless it "
+        "counts from 1970, its `start`: for days of a spreadsheet mostly `unit: d, start: 1899-12-30T00:00:00Z`.",
     ),
 )
 _COMMA_ADVICE = (
     "This is a number with a comma before its decimals: write `decimal: ','` into the profile's source for this log."
 )
-_OTHER_DATE = r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ]\d{1,2}[-./ ]\d{1,4}(?!\d)"
+_OTHER_DATE = r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ](\d{1,2}|[A-Za-z]{3,9})[-./ ]\d{1,4}(?!\d)"
 _DATE_ADVICE = "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`."
 
 

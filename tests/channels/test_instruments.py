@@ -48,7 +48,27 @@ def test_the_source_with_most_readings_serves_the_channel() -> None:
     )
     assert found.sources["heading"] == "HEHDT"
     assert len(found.series["heading"]) == fast.size
-    assert any("HCHDG" in note and "not used" in note for note in found.notes)
+    assert found.notes[-1] == (
+        "heading from HEHDT; also in HCHDG (-8.6 deg in the median, 95 % within 2.7 deg of that), not used"
+    )
+
+
+def test_a_second_instrument_is_compared_with_the_one_that_serves_the_channel() -> None:
+    t = np.arange(0.0, 100.0, 0.5)
+    # headings on either side of north, and a speed log of another scale
+    heading = np.mod(0.1 * np.sin(t / 10.0), 2 * np.pi)
+    other = np.mod(heading + np.deg2rad(3.0), 2 * np.pi)
+    first = gnss(t) | {"heading_rad": heading}
+    second = {name: first[name][::2] for name in gnss(t)} | {"heading_rad": other[::2]}
+    second["speed_over_ground_m_s"] = second["speed_over_ground_m_s"] + 0.5
+    few = {"heading_rad": other[:5]}
+    found = from_readings(frame(("bow", t, first), ("mast", t[::2], second), ("spare", t[:5], few)))
+    notes = [note for note in found.notes if "not used" in note]
+    assert notes == [
+        "speed_over_ground and course_over_ground from bow; also in mast (speed_over_ground +0.5 m/s in the median, "
+        "95 % within 0 m/s of that; course_over_ground +0 deg in the median, 95 % within 0 deg of that), not used",
+        "heading from bow; also in mast (+3 deg in the median, 95 % within 0 deg of that), spare, not used",
+    ]
 
 
 @pytest.mark.parametrize("behind", ["HCHDG", "IIHDT"])

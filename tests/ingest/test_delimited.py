@@ -350,7 +350,8 @@ def test_rows_with_another_number_of_cells_are_reported_with_both_numbers(more, 
 @pytest.mark.parametrize(
     ("text", "time", "advice"),
     [
-        ("03/05/2025 06:00:0{}.638 AM", {"date_form": "dd/mm/yyyy"}, "without AM and PM"),
+        ("13/05/2025 06:00:0{}.638", {"date_form": "mm/dd/yyyy"}, "Times are read as"),
+        ("03-May-2025 06:00:0{}", {}, "The date is no yyyy-mm-dd"),
         ("03/05/2025 06:00:0{}", {}, "The date is no yyyy-mm-dd"),
         ("3.5.2025 06:00:0{} UTC", {}, "The date is no yyyy-mm-dd"),
         ("03/05/2025 06:00:0{} AM", {}, "The date is no yyyy-mm-dd"),
@@ -385,8 +386,8 @@ def test_advice_on_a_time_is_about_what_is_wrong_with_it():
     assert "cannot be read with `date_form: dd/mm/yyyy`" in error.value.message
     assert error.value.next_step.startswith("Times are read as")
     with pytest.raises(DataRejected) as error:
-        read(text.replace(",1,2", " AM,1,2"), profile(None, {"date": "day", "time": "utc", "date_form": "dd.mm.yyyy"}))
-    assert error.value.next_step.startswith("Export the log with a 24-hour clock")
+        read(text.replace(",1,2", " AM,1,2"), profile(None, {"date": "day", "time": "utc", "date_form": "dd/mm/yyyy"}))
+    assert error.value.next_step.startswith("Times are read as")
 
 
 def test_many_times_that_cannot_be_read_are_noted_and_a_few_are_not():

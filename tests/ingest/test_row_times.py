@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 import numpy as np
+import polars as pl
 import pytest
 
 from kempf.pipeline.ingest.read import read_log
@@ -38,7 +39,10 @@ def read(text: str, time: dict):
         ("3.5.2025", "07:47:01", {"date_form": "dd.mm.yyyy"}),
         ("05/03/2025", "07:47:01", {"date_form": "mm/dd/yyyy"}),
         ("030525", "074701", {"date_form": "ddmmyy"}),
+        ("03-May-2025", "7:47:01 AM", {"date_form": "dd-mmm-yyyy"}),
+        ("3 MAY 25", "07:47:01 a.m.", {"date_form": "dd mmm yy"}),
         ("2025-05-03", "28021", {"unit": "s"}),
+        ("2025-05-03", "0.32431712962963", {"unit": "d"}),
         ("2025-05-03", "28021000", {"unit": "ms"}),
     ],
 )
@@ -52,12 +56,55 @@ def test_date_and_time_in_two_columns(day: str, clock: str, more: dict) -> None:
 
 @pytest.mark.parametrize(
     ("instant", "form"),
-    [("03/05/2025 07:47:01", "dd/mm/yyyy"), ("5/3/2025 07:47:01.0", "mm/dd/yyyy"), ("03.05.25T07:47:01", "dd.mm.yy")],
+    [
+        ("03/05/2025 07:47:01", "dd/mm/yyyy"),
+        ("5/3/2025 07:47:01.0", "mm/dd/yyyy"),
+        ("5/3/2025 7:47:01 AM", "mm/dd/yyyy"),
+        ("03.05.25T07:47:01", "dd.mm.yy"),
+        ("3-May-2025 07:47:01", "dd-mmm-yyyy"),
+        ("3 May 2025 07:47:01", "dd mmm yyyy"),
+    ],
 )
 def test_date_and_time_in_one_column_that_is_not_iso(instant: str, form: str) -> None:
     readings = read(f"utc;hdg\n{instant};90\n{instant[:8]};91\nx;92\n", {"column": "utc", "date_form": form})
     assert readings.frame["time_utc_ns"].to_list() == [WANTED]
     assert readings.tally.by_reason == {"malformed": 2}
+
+
+def test_names_of_months() -> None:
+    names = ["Jan", "FEB", "march", "Apr", "May", "Jun", "july", "Aug", "Sept", "Oct", "OCTOBER", "Nov", "Dec", "Mai"]
+    text = "utc,hdg\n" + "".join(f"07-{name}-2025 12:00:00Z,1\n" for name in names)
+    readings = read(text, {"column": "utc", "date_form": "dd-mmm-yyyy"})
+    months = [time.month for time in readings.frame["time_utc_ns"].cast(pl.Datetime("ns")).to_list()]
+    assert months == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]
+    # October comes twice, and of a channel one value a time is kept
+    assert readings.tally.by_reason == {"malformed": 1, "same_instant": 1}
+
+
+def test_halves_of_the_day() -> None:
+    clocks = {
+        "12:00:00 AM": 0,
+        "1:00:00 am": 1,
+        "11:00:00AM": 11,
+        "12:00:00 PM": 12,
+        "01:00:00 p.m.": 13,
+        "11:00 PM": 23,
+    }
+    text = "day,at,hdg\n" + "".join(f"2025-05-03,{clock},1\n" for clock in [*clocks, "13:00:00 PM", "00:10:00 AM"])
+    readings = read(text, {"date": "day", "time": "at"})
+    hours = [time.hour for time in readings.frame["time_utc_ns"].cast(pl.Datetime("ns")).to_list()]
+    assert hours == list(clocks.values())
+    assert readings.rejected["reason"].to_list() == ["malformed", "malformed"]
+
+
+def test_days_of_a_spreadsheet() -> None:
+    exact = "45780.324317129629630"
+    text = f"day,hdg\n{exact},1\n45781,2\n45781.5,3\n-3,4\n4.5e4,5\n"
+    readings = read(text, {"column": "day", "unit": "d", "start": "1899-12-30T00:00:00Z"})
+    first, second, third = readings.frame["time_utc_ns"].to_list()
+    assert first == WANTED and third - second == 43_200 * 10**9
+    assert datetime.fromtimestamp(second / 1e9, UTC) == datetime(2025, 5, 4, tzinfo=UTC)
+    assert readings.rejected["reason"].to_list() == ["malformed", "malformed"]
 
 
 def test_a_night_goes_on_behind_midnight() -> None:

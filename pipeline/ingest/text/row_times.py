@@ -32,16 +32,37 @@ _PAUSE = 20
 
 _NO_ZONE = "Times without a zone are taken as UTC."
 
-_PARTS = {"yyyy": r"(?<y>\d{4})", "yy": r"(?<y>\d{2})", "mm": r"(?<m>\d{1,2})", "dd": r"(?<d>\d{1,2})"}
+_PARTS = {
+    "yyyy": r"(?<y>\d{4})",
+    "yy": r"(?<y>\d{2})",
+    "mmm": r"(?<m>[A-Za-z]{3,9})",
+    "mm": r"(?<m>\d{1,2})",
+    "dd": r"(?<d>\d{1,2})",
+}
+_MONTHS = [
+    "january",
+    "february",
+    "march",
+    "april",
+    "may",
+    "june",
+    "july",
+    "august",
+    "september",
+    "october",
+    "november",
+    "december",
+]
+_MONTH_NUMBERS = {short: str(k) for k, name in enumerate(_MONTHS, 1) for short in (name, name[:3])} | {"sept": "9"}
 _ISO_DATES = r"^(?<y>\d{4})-?(?<m>\d{2})-?(?<d>\d{2})$"
-#: hh:mm, hh:mm:ss or hhmmss, decimals, and a zone behind them
+#: hh:mm, hh:mm:ss or hhmmss, decimals, the half of the day, and a zone behind them
 _ZONE = r"(?: ?(?<z>[Zz]|UTC|[+-]\d.*))?$"
-_CLOCK = r"^(?<h>\d{1,2}):(?<m>\d{2})(?::(?<s>\d{2})(?<f>[.,]\d+)?)?" + _ZONE
-_PLAIN_CLOCK = r"^(?<h>\d{2})(?<m>\d{2})(?<s>\d{2})(?<f>[.,]\d+)?" + _ZONE
+_HALF = r"(?:\s?(?<half>[AaPp])\.?[Mm]\.?)?"
+_CLOCK = r"^(?<h>\d{1,2}):(?<m>\d{2})(?::(?<s>\d{2})(?<f>[.,]\d+)?)?" + _HALF + _ZONE
+_PLAIN_CLOCK = r"^(?<h>\d{2})(?<m>\d{2})(?<s>\d{2})(?<f>[.,]\d+)?(?<half>)" + _ZONE
 
-#: A date, what parts it from the time of day, and that; the second has seconds, as ISO 8601 here.
-_INSTANT = r"^(\S+?)[T\s]+(.+)$"
-_TO_THE_SECOND = r"^(\S+?)[T\s]+(\d{1,2}:\d{2}:\d{2}.*|\d{6}.*)$"
+#: A date, what parts it from the time of day, and that, to the second as in ISO 8601 here.
+_TO_THE_SECOND = r"^(?<date>\S+?)[T\s]+(?<clock>\d{1,2}:\d{2}:\d{2}.*|\d{6}.*)$"
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +109,8 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
     if column.date is not None and column.time is not None:
         instant, good = _of_two(cells[column.date], cells[column.time], column, notes)
     elif column.column is not None and column.date_form is not None:
-        instant, good = _of_two(*_parted(cells[column.column], _INSTANT), column, notes)
+        written = f"^(?<date>{_date_pattern(column.date_form)})[T\\s]+(?<clock>.+)$"
+        instant, good = _of_two(*_parted(cells[column.column], written), column, notes)
     elif column.unit is None:
         text = cells[column.columns[0]]
         instant, good, zoned = iso_instants(spans_of(text))
@@ -198,21 +220,26 @@ def _of_two(date: pl.Series, clock: pl.Series, column: TimeColumn, notes: list[s
 
 def _parted(instant: pl.Series, form: str) -> tuple[pl.Series, pl.Series]:
     """Return date and time of day of instants, null where they are not of the form."""
-    return instant.str.extract(form, 1), instant.str.extract(form, 2)
+    found = instant.str.extract_groups(form).struct
+    return found.field("date"), found.field("clock")
+
+
+def _date_pattern(form: str) -> str:
+    """Return the regular expression of dates of a form."""
+    return "".join(_PARTS.get(sign, re.escape(sign)) for sign in re.split(r"(yyyy|yy|mmm|mm|dd)", form))
 
 
 def _iso_dates(text: pl.Series, form: str | None) -> pl.Series:
     """Return dates as yyyy-mm-dd, null where they are not of the form."""
-    pattern = _ISO_DATES
-    if form is not None:
-        signs = re.split(r"(yyyy|yy|mm|dd)", form)
-        pattern = "^" + "".join(_PARTS.get(sign, re.escape(sign)) for sign in signs) + "$"
+    pattern = _ISO_DATES if form is None else f"^{_date_pattern(form)}$"
     parts = pl.col("text").str.extract_groups(pattern).struct
     year = parts.field("y")
     last = pl.when(year.cast(pl.Int64, strict=False) >= _CENTURY).then(pl.lit("19")).otherwise(pl.lit("20"))
     full = pl.when(year.str.len_bytes() == 2).then(last + year).otherwise(year)
-    two = [parts.field(key).str.pad_start(2, "0") for key in ("m", "d")]
-    return text.alias("text").to_frame().select(full + "-" + two[0] + "-" + two[1]).to_series()
+    month, day = parts.field("m"), parts.field("d").str.pad_start(2, "0")
+    if form is not None and "mmm" in form:
+        month = month.str.to_lowercase().replace_strict(_MONTH_NUMBERS, default=None)
+    return text.alias("text").to_frame().select(full + "-" + month.str.pad_start(2, "0") + "-" + day).to_series()
 
 
 def _iso_clock(text: pl.Series) -> pl.Series:
@@ -222,7 +249,13 @@ def _iso_clock(text: pl.Series) -> pl.Series:
         parts = pl.col("text").str.extract_groups(pattern).struct
         rest = [parts.field(key).fill_null(nothing) for key, nothing in (("s", "00"), ("f", ""), ("z", ""))]
         rest[2] = rest[2].replace("UTC", "Z")
-        shown.append(
-            parts.field("h").str.pad_start(2, "0") + ":" + parts.field("m") + ":" + rest[0] + rest[1] + rest[2]
-        )
+        hour = _of_the_day(parts.field("h"), parts.field("half").str.to_lowercase())
+        shown.append(hour.str.pad_start(2, "0") + ":" + parts.field("m") + ":" + rest[0] + rest[1] + rest[2])
     return text.alias("text").to_frame().select(pl.coalesce(shown)).to_series()
+
+
+def _of_the_day(hour: pl.Expr, half: pl.Expr) -> pl.Expr:
+    """Return the hour of the day; null where a half of the day stands behind an hour that is none of 1 to 12."""
+    number = hour.cast(pl.Int64, strict=False)
+    of_twelve = pl.when(number.is_between(1, 12)).then(number % 12 + pl.when(half == "p").then(12).otherwise(0))
+    return pl.when(half.is_in(["a", "p"])).then(of_twelve.cast(pl.String)).otherwise(hour)

@@ -32,6 +32,9 @@ _CENTURY = 70
 #: Decimal places of one nanosecond in each unit.
 _PLACES = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 
+#: Decimal places of a day that are read, below a nanosecond.
+_DAY_PLACES = 14
+
 #: Largest count of nanoseconds that is taken for a time, about 290 years.
 _LARGEST = 9_200_000_000_000_000_000
 
@@ -252,7 +255,8 @@ def decimal_times(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArra
     ----------
     text : polars.Series of String, shape (n,)
         Such as ``.050000000`` or ``1.714e9``; without blanks around it.
-    unit : {"s", "ms", "us", "ns"}
+    unit : {"s", "ms", "us", "ns", "d"}
+        Of days, decimals beyond the fourteenth are cut off.
 
     Returns
     -------
@@ -260,6 +264,8 @@ def decimal_times(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArra
         Rounded to the nearest nanosecond, half to even; zero where the text is no number.
     good : ndarray of bool, shape (n,)
     """
+    if unit == "d":
+        return _days(text)
     places = _PLACES[unit]
     frame = text.fill_null("").alias("text").to_frame()
     plain = (
@@ -289,6 +295,21 @@ def decimal_times(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArra
         good[i] = exact is not None
         ns[i] = exact or 0
     return np.where(good, ns, 0), good
+
+
+def _days(text: pl.Series) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Convert days with decimals, as spreadsheets count them, to nanoseconds."""
+    found = text.str.extract_groups(r"^(?<whole>[0-9]{1,5})(?:[.](?<part>[0-9]*))?$").struct.unnest()
+    day, part = (
+        found.select(digits.cast(pl.Int64, strict=False).fill_null(0)).to_series().to_numpy()
+        for digits in (
+            pl.col("whole"),
+            pl.col("part").fill_null("").str.slice(0, _DAY_PLACES).str.pad_end(_DAY_PLACES, "0"),
+        )
+    )
+    # a day has 864 * 10^11 ns, so that its decimals stay integers
+    ns = day * DAY_NS + (part * 864 + 500) // 1_000
+    return ns, found["whole"].is_not_null().to_numpy()
 
 
 def _exact(text: str, places: int) -> int | None:
