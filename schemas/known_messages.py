@@ -69,7 +69,13 @@ OFFERED: dict[str, dict[str, ChannelMap]] = {
     "geometry_msgs/QuaternionStamped": {"quaternion.yaw": _YAW_ENU},
     "geometry_msgs/PoseStamped": {"pose.orientation.yaw": _YAW_ENU},
     "geometry_msgs/PoseWithCovarianceStamped": {"pose.pose.orientation.yaw": _YAW_ENU},
-    "nav_msgs/Odometry": {"pose.pose.orientation.yaw": _YAW_ENU, "twist.twist.angular.z": _RATE_UP},
+    "nav_msgs/Odometry": {
+        "pose.pose.orientation.yaw": _YAW_ENU,
+        "twist.twist.angular.z": _RATE_UP,
+        # the twist is in the axes of the child frame, the ship
+        "twist.twist.linear.x": ChannelMap(channel="velocity_forward", unit="m/s"),
+        "twist.twist.linear.y": ChannelMap(channel="velocity_starboard", unit="m/s", positive="port"),
+    },
 }
 
 #: Message -> (fields that begin so, field that is negative where they are void).

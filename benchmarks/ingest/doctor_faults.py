@@ -123,6 +123,16 @@ def _frame(prepare: Callable[[Log], Log], log: Log) -> Stated:
     return Stated(faulty, "frame", other)
 
 
+def _body_to_port(log: Log, _: np.random.Generator) -> Stated:
+    log = with_body_velocities(log)
+    return Stated(_changed(log, "velocity_starboard", np.negative), "sign", ("velocity_starboard",))
+
+
+def _other_axes(log: Log, *names: str) -> Stated:
+    mirrored = Fault("axes", ("heading", "yaw_rate", *names), np.pi / 2)
+    return Stated(mirrored.corrected(log), "axes", mirrored.channels)
+
+
 def _late(*names: str) -> PutIn:
     def fault(log: Log, random: np.random.Generator) -> Stated:
         late = float(random.uniform(3.0, 12.0))
@@ -166,6 +176,11 @@ FAULTS: dict[str, PutIn] = {
     "velocities north and east swapped": _swapped("velocity_north", "velocity_east", with_velocities),
     "earth-fixed velocities as body-fixed": lambda log, _: _frame(with_velocities, log),
     "body-fixed velocities as earth-fixed": lambda log, _: _frame(with_body_velocities, log),
+    "body-fixed velocity, positive to port": _body_to_port,
+    "heading and yaw rate, down for up": lambda log, _: _other_axes(log),
+    "these and the velocity, down for up": lambda log, _: _other_axes(
+        with_velocities(log), "velocity_north", "velocity_east"
+    ),
     "yaw rate, 3 to 12 s late": _late("yaw_rate"),
     "heading, 3 to 12 s late": _late("heading"),
     "heading, clock gains or loses 5 to 20 s": _fast("heading"),

@@ -12,6 +12,9 @@ from scipy.linalg.lapack import dtbtrs
 
 from kempf.pipeline.channels.series import Float
 
+#: Least step, in median ones, that instants are taken to be apart.
+_LEAST = 0.01
+
 
 class Smoother:
     """Smooths columns given at the same instants.
@@ -19,7 +22,7 @@ class Smoother:
     Parameters
     ----------
     time_s : ndarray, shape (n,)
-        Rising, n >= 3.
+        Rising, n >= 3. Steps shorter than a hundredth of their median count as that.
     columns : ndarray, shape (n, k)
     order : int, optional
         Derivative that is kept small: 2 of a cubic spline, 1 of one of straight lines.
@@ -32,6 +35,8 @@ class Smoother:
 
     def __init__(self, time_s: Float, columns: Float, order: int = 2) -> None:
         h = np.diff(time_s)
+        # messages that waited and were logged within microseconds: their squared steps would swamp double precision
+        h = np.maximum(h, _LEAST * np.median(h))
         # divided differences of that order are Q' y: two or three numbers a row
         if order == 1:
             self._q = np.stack([-np.ones(h.size), np.ones(h.size)])

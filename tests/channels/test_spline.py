@@ -21,6 +21,22 @@ def test_it_is_the_spline_of_scipy_at_the_knots(penalty: float) -> None:
         np.testing.assert_allclose(found[:, k], expected, atol=1e-7)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("gap_s", [1e-9, 1e-6, 1e-4])
+def test_readings_that_came_within_a_microsecond_of_each_other_are_smoothed_like_the_others(
+    order: int, gap_s: float
+) -> None:
+    time = np.arange(300.0)
+    held_up = time.copy()
+    held_up[[40, 41, 42, 200]] = [43.0 - 3 * gap_s, 43.0 - 2 * gap_s, 43.0 - gap_s, 201.0 - gap_s]
+    y = np.column_stack([np.sin(0.05 * time) + 0.1 * np.random.default_rng(6).standard_normal(300)])
+    found = Smoother(held_up, y, order)
+    smooth = found.smooth(30.0)
+    assert np.isfinite(found.whitened(30.0)[1])
+    away = np.abs(smooth - Smoother(time, y, order).smooth(30.0))
+    assert np.max(away[60:190]) < 1e-3 and np.max(away) < 0.2
+
+
 def test_without_a_penalty_it_is_the_readings_and_with_all_of_it_a_straight_line() -> None:
     time = np.arange(50.0)
     y = np.column_stack([0.3 * time + np.random.default_rng(4).standard_normal(50)])

@@ -9,7 +9,7 @@ import pytest
 
 from kempf.pipeline.channels.doctor.corrections import setting
 from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine, examine_window
-from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, UNITS, Fault
+from kempf.pipeline.channels.doctor.faults import AXES, BOW_AND_COURSE, UNITS, Fault
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from tests.doctor import closed_form_ship
@@ -89,6 +89,38 @@ def test_the_odd_one_out_is_named_alone_with_its_size(name: str) -> None:
     fault = found.findings[0].faults[0]
     assert fault.value == pytest.approx(expected.value, abs=max(4.0 * fault.std, 0.05 * abs(expected.value)))
     assert found.findings[0].evidence
+
+
+@pytest.mark.parametrize("fault", AXES, ids=["inertial unit", "with its velocity"])
+def test_axes_down_taken_for_axes_up_are_no_wrong_rudder(fault: Fault) -> None:
+    log = closed_form_ship.log()
+    velocity = log.velocity("course")
+    assert velocity is not None
+    north, east = (Series(velocity.time_utc_ns, v) for v in (velocity.value.real, velocity.value.imag))
+    log = log.with_series({**dict.fromkeys(GNSS), "velocity_north": north, "velocity_east": east})
+    assert examine(log).verdict == "clean"
+    mirrored = fault.corrected(log)
+    (finding,) = examine(mirrored).findings
+    assert [f.key for f in finding.faults] == [fault.key]
+    # what is in the other axes twice is in the right ones
+    assert fault.corrected(mirrored).series["heading"].value == pytest.approx(log.series["heading"].value)
+    assert examine(fault.corrected(mirrored)).verdict == "clean"
+
+
+def test_a_body_fixed_velocity_that_counts_to_port_contradicts_the_fixes() -> None:
+    log, psi = closed_form_ship.log(), closed_form_ship.truth()["heading"]
+    velocity = log.velocity("course")
+    assert velocity is not None
+    value = velocity.value * np.exp(-1j * psi)
+    ahead, across = (Series(velocity.time_utc_ns, v) for v in (value.real, value.imag))
+    log = log.with_series({**dict.fromkeys(GNSS), "velocity_forward": ahead, "velocity_starboard": across})
+    sound = examine(log)
+    assert sound.verdict == "clean"
+    (figure,) = next(outcome for outcome in sound.outcomes if outcome.check == "across_body").figures
+    assert figure.value == pytest.approx(1.0, abs=4.0 * figure.std)
+    (finding,) = examine(changed(log, "velocity_starboard", -1.0)).findings
+    assert [f.key for f in finding.faults] == [("sign", ("velocity_starboard",), "")]
+    assert [outcome.check for outcome in finding.evidence] == ["across_body"]
 
 
 def test_bow_and_course_swapped_are_no_late_compass() -> None:

@@ -91,7 +91,20 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
             Correction(known[old][0], known[old][1].model_copy(update={"channel": new}))
             for old, new in _exchanged(fault)
         )
+    if fault.kind == "axes":
+        return tuple(Correction(known[c][0], _in_other_axes(fault, c, known[c][1])) for c in fault.channels)
     return tuple(Correction(known[c][0], _corrected(fault, c, known[c][1])) for c in fault.channels)
+
+
+def _in_other_axes(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:
+    """Return an entry with east and north exchanged, and up and down."""
+    if channel in VELOCITIES["earth"]:
+        (other,) = (name for name in VELOCITIES["earth"] if name != channel)
+        return mapped.model_copy(update={"channel": other})
+    turned = _turned(channel, mapped)
+    if channel != "heading":
+        return turned
+    return turned.model_copy(update={"offset": _offset(channel, turned, fault.value)})
 
 
 def _exchanged(fault: Fault) -> list[tuple[str, str]]:

@@ -12,7 +12,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
-Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck", "leap"]
+Kind = Literal["sign", "unit", "scale", "frame", "axes", "swap", "offset", "latency", "clock_scale", "stuck", "leap"]
 
 #: What a log may hold under the name of the canonical unit: the factor on the reading that corrects it, by name.
 UNITS: dict[str, dict[str, float]] = {
@@ -44,7 +44,7 @@ _SELDOM = ("km/h taken for kn", "kn taken for km/h")
 class Fault:
     """One fault of one instrument."""
 
-    #: One of {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck", "leap"}.
+    #: One of {"sign", "unit", "scale", "frame", "axes", "swap", "offset", "latency", "clock_scale", "stuck", "leap"}.
     kind: Kind
     #: That share the fault.
     channels: tuple[str, ...]
@@ -82,6 +82,12 @@ class Fault:
 
 #: The course follows the bow as she drifts in a turn: in its place it looks like a compass that is late.
 BOW_AND_COURSE = Fault("swap", ("heading", "course_over_ground"), simplicity=2)
+#: What one inertial unit gives in axes north, east and down is mirrored where it is taken for east, north and up, and
+#: the other way round: its heading and yaw rate agree, and so does its velocity.
+AXES = tuple(
+    Fault("axes", channels, pi / 2, simplicity=3)
+    for channels in (("heading", "yaw_rate"), ("heading", "yaw_rate", *VELOCITIES["earth"]))
+)
 
 
 def unit_faults(channels: tuple[str, ...], dimension: str) -> Iterator[Fault]:
@@ -122,6 +128,13 @@ def _frame(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
     return moved | {new: own[old] for old, new in zip(fault.channels, other, strict=True)}
 
 
+def _axes(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    turned = _offset(replace(fault, name="counted anticlockwise"), {"heading": own["heading"]})
+    turned |= _each(own, {"yaw_rate": -own["yaw_rate"].value})
+    north, east = VELOCITIES["earth"]
+    return turned | ({north: own[east], east: own[north]} if east in own else {})
+
+
 def _moved(series: Series, time: Nanoseconds) -> Series:
     # a clock that is set right never runs backwards, but two readings may fall on one nanosecond
     rising = np.concatenate([[True], np.diff(time) > 0])
@@ -160,6 +173,7 @@ _CORRECTIONS = {
     "offset": _offset,
     "swap": _swap,
     "frame": _frame,
+    "axes": _axes,
     "latency": _latency,
     "clock_scale": _clock_scale,
     "stuck": _stuck,

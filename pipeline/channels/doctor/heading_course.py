@@ -10,7 +10,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.align import LONGEST_S, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
-from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, Fault, unit_faults
+from kempf.pipeline.channels.doctor.faults import AXES, BOW_AND_COURSE, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
 from kempf.pipeline.channels.doctor.motion import moves, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
@@ -109,6 +109,7 @@ def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
         Fault("sign", ("heading",)),
         Fault("offset", ("heading",), ninety, "counted anticlockwise from east", simplicity=2),
         *unit_faults(("heading",), "rad"),
+        *AXES,
     ]
     if kind == "course":
         course = (channels[1],)

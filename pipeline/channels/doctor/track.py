@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
+from kempf.pipeline.channels.doctor.faults import AXES, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noise
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import quantile
+from kempf.pipeline.channels.doctor.robust_regression import fit, quantile
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
 #: Ratios of the two ways that are no fault, and angles between them, deg.
 RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)
+#: Share of the body-fixed velocity across the bow that the fixes show.
+_ACROSS = (0.3, 3.0)
 #: Circular variance of the angles between them that is no fault.
 _ASTRAY = 0.15
 #: Windows: so many at most, over each other by three quarters; the way within each, in noises of a fix; so many at
@@ -33,7 +35,8 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     Returns
     -------
     list of Outcome
-        ``path_KIND`` (length) and ``bearing_KIND`` (direction) for each kind of velocity but the track itself.
+        ``path_KIND`` (length) and ``bearing_KIND`` (direction) for each kind of velocity but the track itself;
+        ``across_body`` for the drift of a body-fixed one.
     """
     track = log.track()
     if track is None:
@@ -44,7 +47,12 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         if velocity is None or velocity.time_utc_ns.size < _FEWEST:
             continue
         still = does_not_move(log)
-        ways = None if still else _ways(track, velocity.time_utc_ns, velocity.value)
+        values = [velocity.value]
+        if kind == "body":
+            across = log.series["velocity_starboard"]
+            mirrored = log.with_series({"velocity_starboard": Series(across.time_utc_ns, -across.value)})
+            values += [other.value for other in [mirrored.over_ground(kind)] if other is not None]
+        ways = None if still else _ways(track, velocity.time_utc_ns, *values)
         channels = ("latitude", "longitude", *velocity.channels, *(("heading",) if kind == "body" else ()))
         pair = VELOCITIES[kind]
         speed = pair[:1] if kind == "course" else pair
@@ -58,13 +66,17 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         late = 1.0 + quantile(step, 0.5)
         one_sided = late * abs(quantile(np.diff(velocity.direction) / step, 0.5))
         outcomes += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
+        if kind == "body" and len(ways) > 2:
+            outcomes.append(_across(channels, ways))
     if not outcomes and "speed_over_ground" in log.series:
         outcomes += _without_course(log, track)
     return outcomes
 
 
-def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Complex) -> tuple[Complex, Complex] | None:
-    """Return the displacements by the fixes and by the velocity, each shape (n,); None for too few."""
+def _ways(
+    track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Complex, *others: Complex
+) -> tuple[Complex, ...] | None:
+    """Return the displacements by the fixes, by the velocity and by other ones, each shape (n,); None for too few."""
     start, end = max(int(track[0][0]), int(time[0])), min(int(track[0][-1]), int(time[-1]))
     span = (end - start) / SECOND_NS
     fast = quantile(np.abs(velocity), 0.75)
@@ -83,11 +95,14 @@ def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Compl
     gap = max(3.0 * max(periods), 1.0)
     moved = _between(track[0], track[1], begin, stop, gap)
     step = np.diff(time) / SECOND_NS
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
-    gone = _between(time, total, begin, stop, gap)
+    gone, *more = (_between(time, _summed(each, step), begin, stop, gap) for each in (velocity, *others))
     good = np.isfinite(moved) & np.isfinite(gone)
     good &= np.maximum(np.abs(moved), np.abs(gone)) > 0.5 * way
-    return (moved[good], gone[good]) if np.count_nonzero(good) >= _FEWEST else None
+    return tuple(each[good] for each in (moved, gone, *more)) if np.count_nonzero(good) >= _FEWEST else None
+
+
+def _summed(velocity: Complex, step: Float) -> Complex:
+    return np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
 
 
 def _between(time: Nanoseconds, place: Complex, begin: Nanoseconds, stop: Nanoseconds, gap: float) -> Complex:
@@ -96,7 +111,7 @@ def _between(time: Nanoseconds, place: Complex, begin: Nanoseconds, stop: Nanose
     return moved
 
 
-def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: tuple[Complex, Complex]) -> Outcome:
+def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: tuple[Complex, ...]) -> Outcome:
     moved, gone = np.abs(ways[0]), np.abs(ways[1])
     good = (moved > 0.0) & (gone > 0.0)
     if np.count_nonzero(good) < _FEWEST:
@@ -127,8 +142,8 @@ def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...]
     return Outcome(name, channels, figure.state, words, (figure,), min(spread + abs(middle), 1.0), tuple(suspects))
 
 
-def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Complex], one_sided: float) -> Outcome:
-    moved, gone = ways
+def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, ...], one_sided: float) -> Outcome:
+    moved, gone = ways[:2]
     turn = moved * np.conj(gone)
     unit = turn / np.maximum(np.abs(turn), 1e-300)
     mean = complex(np.mean(unit))
@@ -168,12 +183,32 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Comple
     else:
         suspects += [
             Fault("swap", pair), Fault("sign", pair[:1]), Fault("sign", pair[1:]),
-            Fault("frame", pair, name=f"{'body' if kind == 'earth' else 'earth'}-fixed"),
+            Fault("frame", pair, name=f"{'body' if kind == 'earth' else 'earth'}-fixed"), *AXES,
         ]  # fmt: skip
         if kind == "body":
             suspects += [Fault("offset", ("heading",), angle, "turned", std, simplicity=2), Fault("sign", ("heading",))]
     state = worst([figure.state for figure in figures])
     return Outcome(f"bearing_{kind}", channels, state, words, figures, min(astray, 1.0), tuple(suspects))
+
+
+def _across(channels: tuple[str, ...], ways: tuple[Complex, ...]) -> Outcome:
+    """Compare the way across the bow: a drift to the other side is as long, and its bearing in the mean as right."""
+    moved, gone, mirrored = ways
+    ahead, across = 0.5 * (gone + mirrored), 0.5 * (gone - mirrored)
+    bow = ahead / np.maximum(np.abs(ahead), 1e-300)
+    columns = np.column_stack([np.imag(across * np.conj(bow)), np.abs(ahead)])
+    # what goes with the way ahead is an angle between compass and sensor
+    line = fit(columns, np.imag(moved * np.conj(bow)))
+    if line is None:
+        return untestable("across_body", channels, "position constant, or speed zero")
+    slope, std = float(line.value[0]), float(line.std[0])
+    figure = Figure("way across the bow by the fixes over that by the velocity", slope, std, *_ACROSS)
+    words = f"the fixes show {slope:.2f} ± {std:.2g} (1 s.e.) times the drift of the velocity across the bow"
+    suspects = (
+        Fault("sign", VELOCITIES["body"][1:]),
+        *(Fault("sign", (name,)) for name in ("latitude", "longitude", "heading")),
+    )
+    return Outcome("across_body", channels, figure.state, words, (figure,), min(line.left_over, 1.0), suspects)
 
 
 def _without_course(log: Log, track: tuple[Nanoseconds, Complex]) -> list[Outcome]:

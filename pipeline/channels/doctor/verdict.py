@@ -132,6 +132,9 @@ _WORDS: dict[str, Callable[[str, Fault], str]] = {
     ),
     "sign": lambda names, _: f"{names} has the wrong sign",
     "swap": lambda names, _: f"{names} are swapped",
+    "axes": lambda names, _: (
+        f"{names} are in axes north, east and down, taken for east, north and up, or the other way round"
+    ),
     "frame": lambda names, fault: f"{names} are {fault.name} where {_FRAMES[fault.name]}",
     "latency": lambda names, fault: (
         f"{names} is {abs(fault.value):.2f} ± {fault.std:.1g} s ({fault.spread}) "
