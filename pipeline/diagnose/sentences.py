@@ -28,8 +28,8 @@ _NAMED = 3
 _REST = "; neither a known effect nor a smooth force of unknown origin improves on the rest"
 #: said of the free runs of such a ship
 _UNSTABLE = (
-    " She does not keep a straight course by herself, so that the free run of any model leaves hers: what counts is "
-    "the error one leg ahead."
+    " With these parameters she does not keep a straight course by herself, so that the free run of any model leaves "
+    "hers: what counts is the error one leg ahead."
 )
 
 
@@ -188,7 +188,8 @@ def _fall(first: Step, last: Step) -> str:
         return _fall_by_legs(first, last, disturbance)
     fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
     if a is None or b is None:
-        return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
+        alone = f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
+        return alone + _fitted_to_legs(first)
     held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
     sentence = (
         f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
@@ -201,7 +202,26 @@ def _fall(first: Step, last: Step) -> str:
             " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
             "and the disturbance."
         )
-    return sentence
+    return sentence + _fitted_to_legs(first)
+
+
+def _fitted_to_legs(first: Step) -> str:
+    """Say what the free runs of the first model are with the parameters that its predictions take.
+
+    Those of the likelihood, which carry the fault of that model, are not what the last one has to be better than.
+    """
+    if not first.predicts_by_legs or not first.by_legs:
+        return ""
+    fitted, held = first.free_runs(by_legs=True)
+    errors = [
+        f"{_share(float(np.mean([run.relative_error for run in runs])))} % in {name} manoeuvres"
+        for name, runs in (("held-out", held), ("fitted", fitted))
+        if runs
+    ]
+    return (
+        f" Predictions with the first model take parameters fitted to legs: with these its free-run error is "
+        f"{listed(errors)}."
+    )
 
 
 def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:

@@ -100,6 +100,11 @@ def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[S
     said = sentences(found)
     assert f"tau = {tau:.3f} ± {std:.3f} s (1 s.e.)" in said[0] and "held-out" in said[5]
     assert "noise of the experiment" in said[3] and said[4].startswith("What is left is largest in ")
+    # fitted to legs, as predictions take it, the plain model hides most of the lag
+    assert first.predicts_by_legs and not last.predicts_by_legs
+    (by_legs,) = first.free_runs(by_legs=True)[1]
+    assert by_legs.relative_error < 0.5 * first.held_out_error
+    assert f"is {100.0 * by_legs.relative_error:.1f} % in held-out manoeuvres" in said[5]
 
 
 def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
