@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.files import McapFiles
 from kempf.pipeline.ingest.mcap.records import McapChannel
-from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.mcap.topics import Route
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
@@ -137,7 +137,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     yield from _DecodeJob(name, log, source).run(patterns)
 
 
-def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -> set[str]:
+def _topics(name: str, log: LogFile, source: Source | None, known: McapFiles) -> set[str]:
     """Return the topics of a file, as far as they decide to which of them a key of the profile belongs.
 
     The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not list the topics, the
@@ -145,7 +145,7 @@ def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -
     """
     channels = known.channels
     if not channels and any(key.count(".") > 1 for key in (source.channels if source else ())):
-        stream = McapStream(name, log)
+        stream = McapFiles(name, log)
         for _ in stream.batches():
             pass
         channels = stream.channels
@@ -157,7 +157,7 @@ class _DecodeJob:
 
     def __init__(self, name: str, log: LogFile, source: Source | None) -> None:
         self.name, self.log, self.source = name, log, source
-        self.stream = McapStream(name, log)
+        self.stream = McapFiles(name, log)
         self.topics = _topics(name, log, source, self.stream)
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
@@ -223,6 +223,7 @@ class _DecodeJob:
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
         """Decode the messages of one channel."""
         batch = part.batch
+        self.stream.budget.decode(int(np.sum(batch.end[record] - batch.first[record])))
         decoded = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
         part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
         if decoded.time_ns is not None:

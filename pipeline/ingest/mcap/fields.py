@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.files import McapFiles
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
-from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
 from kempf.schemas.profile import ChannelMap
@@ -37,7 +37,7 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
     DataRejected
         The file unpacks to far more than a log of its size holds.
     """
-    stream = McapStream(name, log)
+    stream = McapFiles(name, log)
     first = _first_messages(stream)
     topics: dict[str, Fields] = {}
     for number, channel in stream.channels.items():
@@ -50,7 +50,7 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
     return dict(sorted(topics.items()))
 
 
-def _first_messages(stream: McapStream) -> dict[int, bytes]:
+def _first_messages(stream: McapFiles) -> dict[int, bytes]:
     """Return the first message of every channel that has one in the first stretches of the file."""
     first: dict[int, bytes] = {}
     for batch in islice(stream.batches(), _MOST):

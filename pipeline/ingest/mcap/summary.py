@@ -55,6 +55,8 @@ class Summary:
     #: CRC of the data section, 0 for none; `data_end` is where its record stands.
     data_crc: int = 0
     data_end: int = -1
+    #: Whether it stands where the footer says, right behind the data section, and ends with the file.
+    stands_right: bool = False
     notes: list[str] = field(default_factory=list)
 
 
@@ -87,6 +89,7 @@ def read_summary(log: LogFile) -> Summary:
         return summary
     summary.stop = footer.summary_start
     _take(summary, content)
+    summary.stands_right = summary.data_end >= 0 and not summary.notes
     return summary
 
 
