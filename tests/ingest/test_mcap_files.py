@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
+import struct
+import zlib
 
 import pytest
 import zstandard
-from mcap.writer import CompressionType, IndexType
+from mcap.writer import CompressionType, IndexType, Writer
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap import budget, seams
@@ -17,7 +20,7 @@ from tests.ingest.mcap_variants import chunk_record
 from tests.ingest.test_mcap import START, plain, profile, read, write
 from tests.ingest.test_salvage import OPENED
 
-BEHIND = "The log is 2 MCAP files behind each other; all of them were read."
+BEHIND = "The log is 2 MCAP files behind each other, which were read one after the other."
 
 
 def halves(n: int = 60, **options: object) -> tuple[bytes, bytes]:
@@ -64,6 +67,40 @@ def test_a_second_file_that_is_damaged_is_read_as_far_as_it_is_whole(index: Inde
     assert 60 < readings.tally.records_kept < 120 and readings.partial
     (note,) = [note for note in readings.notes if "cut short" in note]
     assert note.startswith(f"In the file from byte {len(first)} on: ")
+
+
+@pytest.mark.parametrize("options", [{}, {"compression": CompressionType.NONE}, {"use_chunking": False}])
+def test_a_file_behind_one_that_was_cut_is_not_taken_for_its_end(options: dict[str, object]) -> None:
+    first = write(plain()[:60], **options)
+    # its first channel is another one
+    second = write([("/nav", 100.0, {"pose": {"speed": 1, "cog": 2}, "heading": 77}), *plain()[60:]], **options)
+    readings = read(first[: len(first) * 2 // 3] + second)
+    assert readings.tally.by_reason.keys() <= {"malformed", "clock_back"} and readings.partial
+    late = readings.frame.filter(readings.frame["source"] == "/gyro")["heading_rad"]
+    assert late[-30:].to_list() == [math.radians(k / 4) for k in range(30, 60)]
+
+
+def attaching(content: bytes, crc: int | None) -> bytes:
+    out = io.BytesIO()
+    writer = Writer(out)
+    writer.start()
+    writer.register_channel("/aft", "json", 0)
+    writer.add_attachment(0, 0, "before.mcap", "application/mcap", content)
+    writer.finish()
+    data = out.getvalue()
+    stored = struct.pack("<I", zlib.crc32(data[data.index(b"\x09", 20) + 9 : data.index(content) + len(content)]))
+    assert stored in data
+    return data if crc is None else data.replace(stored, struct.pack("<I", crc))
+
+
+@pytest.mark.parametrize("crc", [None, 0])
+def test_a_file_that_is_attached_to_one_without_an_end_is_no_file_of_the_log(crc: int | None) -> None:
+    inner = write(plain())
+    # cut behind its attachment
+    outer = attaching(inner, crc)
+    outer = outer[: outer.index(inner) + len(inner) + 4]
+    assert seams.places_of_files(LogFile(outer)) == [(0, len(outer))]
+    assert len(seams.places_of_files(LogFile(outer + inner))) == 2
 
 
 def test_what_stands_behind_the_end_and_is_no_file_is_lost_and_counted() -> None:

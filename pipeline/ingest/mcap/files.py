@@ -88,7 +88,9 @@ class McapFiles:
             self.lost += file.lost
             self.notes += [f"In the file from byte {begin} on: {note}" if k else note for note in file.notes]
         if len(self._files) > 1:
-            self.notes.append(f"The log is {len(self._files)} MCAP files behind each other; all of them were read.")
+            self.notes.append(
+                f"The log is {len(self._files)} MCAP files behind each other, which were read one after the other."
+            )
 
     def _renumbered(self, k: int, batch: Batch) -> Batch:
         self._take_descriptions(k)

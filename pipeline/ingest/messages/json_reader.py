@@ -13,6 +13,9 @@ from kempf.pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT
 from kempf.pipeline.ingest.spans import Spans
 from kempf.pipeline.ingest.text.cells import number
 
+#: Most digits of the place of an element.
+_LONGEST_INDEX = 9
+
 #: A tree of field names; the leaves are empty.
 Tree = dict[str, "Tree"]
 
@@ -23,7 +26,7 @@ class JsonReader:
     Parameters
     ----------
     wanted : list of str
-        Fields, nested ones with dots.
+        Fields, nested ones with dots; a number is an element of a list, counted from 0, or a key that reads so.
     """
 
     def __init__(self, wanted: list[str]) -> None:
@@ -33,6 +36,7 @@ class JsonReader:
             node = tree
             for part in path:
                 node = node.setdefault(part, {})
+        self._elements = np.array([any(_is_index(part) for part in path) for path in self._paths], dtype=np.bool_)
         self._nodes, self._keys = _flat(tree, self._paths)
         #: a JSON schema need not name every field: what is missing shows in the messages
         self.missing: dict[str, str] = {}
@@ -52,7 +56,9 @@ class JsonReader:
             payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, tokens, value, columns.good
         )
         kind, first, last = tokens[..., 0], tokens[..., 1], tokens[..., 2]
-        for i in np.flatnonzero(~columns.good):
+        # the compiled walk steps over lists
+        listed = (kind[:, self._elements] == ABSENT).any(axis=1) if self._elements.any() else False
+        for i in np.flatnonzero(~columns.good | listed):
             payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
             columns.good[i] = self._slow(payload, kind[i], value[i])
         value[kind != NUMBER] = np.nan
@@ -68,20 +74,37 @@ class JsonReader:
     def _slow(self, payload: bytes, kind: NDArray[np.int64], value: NDArray[np.float64]) -> bool:
         """Read one message by Python's own reader."""
         kind[:] = ABSENT
-        try:
-            message = json.loads(payload)
-        except (ValueError, RecursionError):
-            return False
-        if not isinstance(message, dict):
+        message = _parsed(payload)
+        if message is None and payload.endswith(b"\0"):
+            # that ends a string in C; tried second, for UTF-16 may end so too
+            message = _parsed(payload.rstrip(b"\0"))
+        if message is None:
             return False
         for slot, path in enumerate(self._paths):
             kind[slot], value[slot] = _leaf(message, path)
         return True
 
 
+def _parsed(payload: bytes) -> dict[str, Any] | None:
+    """Return a JSON object, None for anything else."""
+    try:
+        message = json.loads(payload)
+    except (ValueError, RecursionError):
+        return None
+    return message if isinstance(message, dict) else None
+
+
+def _is_index(part: str) -> bool:
+    """Return whether a part of a path may be the place of an element in a list."""
+    return part.isascii() and part.isdigit() and len(part) <= _LONGEST_INDEX
+
+
 def _leaf(value: Any, path: list[str]) -> tuple[int, float]:
     for part in path:
-        value = value.get(part) if isinstance(value, dict) else None
+        if isinstance(value, list) and _is_index(part):
+            value = value[int(part)] if int(part) < len(value) else None
+        else:
+            value = value.get(part) if isinstance(value, dict) else None
     if value is None:
         return ABSENT, np.nan
     if isinstance(value, bool) or not isinstance(value, int | float | str):
