@@ -13,6 +13,7 @@ from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
 from kempf.pipeline.ingest.mcap.files import McapFiles
+from kempf.pipeline.ingest.mcap.odd_times import OddTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
 from kempf.pipeline.ingest.mcap.topics import Route
 from kempf.pipeline.ingest.messages.columns import NoReaderError
@@ -297,10 +298,12 @@ class _DecodeJob:
                     absent[topic, key] = f"No message of {topic} has the field {key}{f': {why}' if why else ''}."
         notes += absent.values()
         assert self.time_field is not None or not self.untimed
+        odd, of_times = self._odd_times(), dict.fromkeys(n for r in self.routes.values() if r for n in r.time_notes)
         for topic in sorted(self.untimed):
-            notes.append(
-                f"Messages of {topic} without {self.time_field.column if self.time_field else ''} have log time."
-            )
+            column = self.time_field.column if self.time_field else ""
+            found = f"have log time where {column} is no time, such as {odd[topic].found}" if topic in odd else ""
+            notes.append(f"Messages of {topic} {found or f'without {column} have log time'}.")
+        notes += of_times
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
         unmapped = sorted(set(self.places) - read - set(self.refused))
         if unmapped:
@@ -309,6 +312,11 @@ class _DecodeJob:
         for topic, lines in self.offered.items():
             notes.append(f"Topic {topic} is mapped so if its axes are those of REP-103: {lines}.")
         return notes
+
+    def _odd_times(self) -> dict[str, OddTime]:
+        """Return by topic the first time of its messages that is not written as the profile says."""
+        routes = ((self.stream.channels[number].topic, route) for number, route in self.routes.items())
+        return {topic: route.odd_time for topic, route in routes if route and route.odd_time}
 
     def require_something(self, patterns: list[str]) -> None:
         """Refuse a file of which nothing was asked that it has."""
@@ -324,7 +332,9 @@ class _DecodeJob:
                 {"name": self.name, "topics": topics, "patterns": patterns},
             )
         if self.time_field is not None and not self.timed:
-            column = self.time_field.column
+            column = self.time_field.column or ""
+            for topic, odd in self._odd_times().items():
+                raise odd.refusal(self.name, column, topic)
             raise UsageError(
                 "no_time_column",
                 f"The source for {self.name} takes its time from {column!r}, which no message that it maps has; "
