@@ -12,6 +12,7 @@ from kempf.pipeline.ingest import sniff
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
 from kempf.pipeline.ingest.decoded import Decoded, Misfit
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
+from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
@@ -97,12 +98,12 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             source = source and source.model_copy(update={"encoding": "utf-8"})
         file = LogFile(content)
     log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
-    kind = sniff.no_log(file.read(0, sniff.SAMPLE))
-    if kind is not None:
+    foreign = foreign_file(file.read(0, sniff.SAMPLE))
+    if foreign is not None:
         raise DataRejected(
             "unknown_format",
-            f"{name} is {kind}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
-            "Give the log that the logger wrote, or export it as one of these. " + _SEE_PROFILE,
+            f"{name} is {foreign.description}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
+            f"{foreign.next_step} {_SEE_PROFILE}",
             {"name": name},
         )
     if log_format is None:

@@ -11,11 +11,14 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import sentences
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
 from kempf.pipeline.ingest.mcap.files import McapFiles
 from kempf.pipeline.ingest.mcap.odd_times import OddTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
 from kempf.pipeline.ingest.mcap.topics import Route
+from kempf.pipeline.ingest.mcap.unmapped import NAMED, unmapped
+from kempf.pipeline.ingest.mcap.unread import unreadable
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError
@@ -26,8 +29,8 @@ T = TypeVar("T", bound=np.generic)
 
 _TIMES = ("log_time", "publish_time")
 
-#: Topics that are named in a message to a person, at most.
-_NAMED = 20
+#: Messages of a topic in which NMEA sentences are looked for, and bytes of each.
+_LOOKED_AT, _HEAD = 3, 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,8 +135,8 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
         Neither profile nor definitions say what a topic means (``no_source_for_log``), no message has the time that the
         profile names (``no_time_column``), or two fields of one message are mapped to one channel.
     DataRejected
-        A topic that the profile maps is not in the file (``topics_missing``), or it unpacks to far more than a log of
-        its size holds.
+        A topic that the profile maps is not in the file (``topics_missing``), none of them can be read
+        (``topics_unreadable``), or it unpacks to far more than a log of its size holds.
     """
     yield from _DecodeJob(name, log, source).run(patterns)
 
@@ -167,12 +170,13 @@ class _DecodeJob:
         self.time_field = time if time and time.column and time.column not in _TIMES else None
         self.routes: dict[int, Route | None] = {}
         self.made: dict[McapChannel, Route | None] = {}
-        self.refused: dict[str, str] = {}
+        self.refused: dict[str, NoReaderError] = {}
         self.seen: dict[str, set[str]] = {}
         self.timed, self.untimed = False, set[str]()
         self.places: dict[str, int] = {}
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
+        self.looked_at, self.sentences = set[str](), list[str]()
 
     def _owners(self) -> dict[str, tuple[str, str]]:
         """Split the profile's keys into topic and field: the longest topic that fits."""
@@ -217,9 +221,18 @@ class _DecodeJob:
                 part.reason[record] = CODE[Reason.MALFORMED]
             elif (route := self._route(number, channel)) is None:
                 part.reason[record] = CODE[Reason.NO_CHANNEL]
+                self._look_for_sentences(channel.topic, batch, record)
             else:
                 self._read(part, record, channel.topic, route)
         return part
+
+    def _look_for_sentences(self, topic: str, batch: Batch, record: NDArray[np.int64]) -> None:
+        """Look once whether the messages of a topic that nobody asks for hold NMEA sentences."""
+        if topic not in self.looked_at:
+            self.looked_at.add(topic)
+            first = (batch.content[batch.first[i] : batch.end[i]].tobytes() for i in record[:_LOOKED_AT].tolist())
+            if any(sentences.holds_sentence(payload[:_HEAD]) for payload in first):
+                self.sentences.append(topic)
 
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
         """Decode the messages of one channel."""
@@ -269,7 +282,7 @@ class _DecodeJob:
         try:
             return Route(channel, schema, mapped, self.time_field)
         except NoReaderError as why:
-            self.refused[channel.topic] = str(why)
+            self.refused[channel.topic] = why
             return None
 
     def _refuse_late_owner(self, before: dict[str, tuple[str, str]], topic: str) -> None:
@@ -307,8 +320,10 @@ class _DecodeJob:
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
         unmapped = sorted(set(self.places) - read - set(self.refused))
         if unmapped:
-            more = f" and {len(unmapped) - _NAMED} more" if len(unmapped) > _NAMED else ""
-            notes.append(f"Topics without a channel: {', '.join(unmapped[:_NAMED])}{more}.")
+            more = f" and {len(unmapped) - NAMED} more" if len(unmapped) > NAMED else ""
+            notes.append(f"Topics without a channel: {', '.join(unmapped[:NAMED])}{more}.")
+        if self.sentences:
+            notes.append(f"{sentences.about(self.sentences)} {sentences.NEXT_STEP}")
         for topic, lines in self.offered.items():
             notes.append(f"Topic {topic} is mapped so if its axes are those of REP-103: {lines}.")
         return notes
@@ -321,16 +336,11 @@ class _DecodeJob:
     def require_something(self, patterns: list[str]) -> None:
         """Refuse a file of which nothing was asked that it has."""
         topics = sorted({channel.topic for channel in self.stream.channels.values()})
-        named = ", ".join(topics[:_NAMED]) or "none"
+        named = ", ".join(topics[:NAMED]) or "none"
         if not self.keys and not self.taken:
-            offers = " ".join(lines for _, lines in sorted(self.offered.items()))
-            raise UsageError(
-                "no_source_for_log",
-                f"{self.name} is an MCAP file, for which the profile maps no topic; its topics are {named}.",
-                f"`kempf profile draft {self.name}` writes a source to complete, which maps '<topic>.<field>' to "
-                "channels. See docs/profile.md." + (f" With axes as in REP-103: {offers}." if offers else ""),
-                {"name": self.name, "topics": topics, "patterns": patterns},
-            )
+            offers = [lines for _, lines in sorted(self.offered.items())]
+            fits = self.source is not None
+            raise unmapped(self.name, topics, patterns, fits=fits, offers=offers, spoken=self.sentences)
         if self.time_field is not None and not self.timed:
             column = self.time_field.column or ""
             for topic, odd in self._odd_times().items():
@@ -351,6 +361,8 @@ class _DecodeJob:
                 "Correct the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
                 {"name": self.name, "missing": missing, "found": topics},
             )
+        if self.refused and not any(self.routes.values()):
+            raise unreadable(self.name, self.refused)
         if missing:
             self.stream.notes.append(f"What is left of the file has no topic for {', '.join(missing)}.")
 

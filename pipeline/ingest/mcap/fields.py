@@ -11,9 +11,11 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import sentences
 from kempf.pipeline.ingest.mcap.files import McapFiles
 from kempf.pipeline.ingest.mcap.joint_names import joint_names
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
+from kempf.pipeline.ingest.mcap.topics import reader_of
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans, as_bytes
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
@@ -70,6 +72,28 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
                 fields |= {key: named.get(key.rpartition(".")[2]) for key, one in fields.items() if one is None}
         topics.setdefault(channel.topic, {}).update(fields)
     return dict(sorted(topics.items()))
+
+
+def obstacles(name: str, log: LogFile) -> dict[str, str]:
+    """Return why topics hold no number that can be read, as sentences, each with what to do.
+
+    Parameters
+    ----------
+    name, log
+        See `fields_of`.
+    """
+    stream = McapFiles(name, log)
+    found, spoken = {}, set()
+    for number, messages in _first_messages(stream).items():
+        if (channel := stream.channels.get(number)) is None:
+            continue
+        if any(map(sentences.holds_sentence, messages)):
+            spoken.add(channel.topic)
+        try:
+            reader_of(channel, stream.schemas.get(channel.schema), [], [])
+        except NoReaderError as why:
+            found[f"Topic {channel.topic} {why}."] = why.next_step
+    return {sentences.about(spoken): sentences.NEXT_STEP} | found if spoken else found
 
 
 def _first_messages(stream: McapFiles) -> dict[int, list[bytes]]:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.mapping import check_once
 from kempf.pipeline.ingest.mcap.odd_times import OddTime, odd_time
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
-from kempf.pipeline.ingest.messages.columns import Columns, MessageReader, NoReaderError
+from kempf.pipeline.ingest.mcap.unread import unread
+from kempf.pipeline.ingest.messages.columns import Columns, MessageReader
 from kempf.pipeline.ingest.spans import Spans
 from kempf.pipeline.ingest.text.row_times import text_instants
 from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
@@ -76,7 +77,7 @@ class Route:
         if time is not None:
             wanted |= dict.fromkeys([self._clock, *(f"{self._clock}.{p}" for pair in _STAMPS for p in pair)])
         self._wanted = list(wanted)
-        self._reader = _reader(channel, schema, self._wanted, [self._clock] if time is not None else [])
+        self._reader = reader_of(channel, schema, self._wanted, [self._clock] if time is not None else [])
         #: the first time of its messages that is none, if one was read that is not as the profile says
         self.odd_time: OddTime | None = None
         #: what a person should know of the times
@@ -162,20 +163,25 @@ def _angle(
     return np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
-def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str], text: list[str]) -> MessageReader:
+def reader_of(channel: McapChannel, schema: Schema | None, wanted: list[str], text: list[str]) -> MessageReader:
     """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles.
 
     Parameters
     ----------
     text : list of str
         Fields whose text may be a time.
+
+    Raises
+    ------
+    NoReaderError
+        The messages cannot be read; says why, and what to do.
     """
     schema_encoding = schema.encoding if schema else ""
     if channel.encoding == "json":
         from kempf.pipeline.ingest.messages.json_reader import JsonReader
 
         return JsonReader(wanted, text)
-    if channel.encoding == "cdr" and schema and schema_encoding == "ros2msg":
+    if channel.encoding == "cdr" and schema and schema_encoding == "ros2msg" and schema.data.strip():
         from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
 
         return CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)
@@ -183,7 +189,4 @@ def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str], text
         from kempf.pipeline.ingest.messages.protobuf_reader import ProtobufReader
 
         return ProtobufReader(schema.name, schema.data, wanted)
-    if channel.encoding in ("cdr", "protobuf"):
-        described = f"a schema in {schema_encoding}" if schema_encoding else "no schema"
-        raise NoReaderError(f"is encoded as {channel.encoding} with {described}")
-    raise NoReaderError(f"is encoded as {channel.encoding or 'nothing that is named'}; JSON, CDR and protobuf are read")
+    raise unread(channel.encoding, schema)

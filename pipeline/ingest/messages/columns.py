@@ -47,4 +47,16 @@ class MessageReader(Protocol):
 
 
 class NoReaderError(Exception):
-    """Messages of a channel cannot be read; says why."""
+    """Messages of a channel cannot be read.
+
+    Parameters
+    ----------
+    why : str
+        What of them; the topic stands before it.
+    next_step : str, optional
+        What to do.
+    """
+
+    def __init__(self, why: str, next_step: str = "") -> None:
+        super().__init__(why)
+        self.next_step = next_step
