@@ -47,7 +47,7 @@ GYRO = profile({"/gyro.heading": {"channel": "heading", "unit": "deg"}})
             "sourced",
         ),
         (encoded("cdr", "", b""), "is encoded as cdr with no schema", "sourced"),
-        (encoded("cbor", ""), "is encoded as cbor", "Let the logger write these topics in one of them"),
+        (encoded("cbor", ""), "is encoded as cbor", "Let the logger write these topics in JSON"),
     ],
 )
 def test_an_encoding_that_is_not_read_is_named_with_what_to_do(
@@ -55,7 +55,7 @@ def test_an_encoding_that_is_not_read_is_named_with_what_to_do(
 ) -> None:
     with pytest.raises(DataRejected) as refused:
         read_log("log.mcap", data, GYRO)
-    assert refused.value.code == "topics_unreadable"
+    assert refused.value.code == "no_valid_reading"
     assert f"Topic /gyro {why}" in refused.value.message.replace("is encoded as cdr, and the", "the")
     assert step in refused.value.next_step
     (tmp_path / "log.mcap").write_bytes(data)
@@ -76,10 +76,7 @@ def test_beside_topics_that_can_be_read_a_note_is_enough() -> None:
     writer.finish()
     readings = read(out.getvalue(), given)
     assert readings.tally.records_kept == 1
-    assert (
-        readings.notes[0]
-        == "Topic /aft is encoded as cbor; JSON, CDR with definitions in ros2msg, and protobuf are read."
-    )
+    assert readings.notes[0] == "Topic /aft is encoded as cbor; JSON, CDR and protobuf are read."
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ from kempf.pipeline.ingest.mcap.odd_times import OddTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
 from kempf.pipeline.ingest.mcap.topics import Route
 from kempf.pipeline.ingest.mcap.unmapped import NAMED, unmapped
-from kempf.pipeline.ingest.mcap.unread import unreadable
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError
@@ -135,8 +134,8 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
         Neither profile nor definitions say what a topic means (``no_source_for_log``), no message has the time that the
         profile names (``no_time_column``), or two fields of one message are mapped to one channel.
     DataRejected
-        A topic that the profile maps is not in the file (``topics_missing``), none of them can be read
-        (``topics_unreadable``), or it unpacks to far more than a log of its size holds.
+        A topic that the profile maps is not in the file (``topics_missing``), or it unpacks to far more than a log of
+        its size holds.
     """
     yield from _DecodeJob(name, log, source).run(patterns)
 
@@ -198,7 +197,9 @@ class _DecodeJob:
                 first, waiting = first + waiting.size, _Waiting()
         self.require_something(patterns)
         last = waiting.decoded(self.log, first, tuple(self.places))
-        yield replace(last, notes=[*self.stream.notes, *self._notes()], lost=tuple(self.stream.lost), ends=True)
+        steps = dict.fromkeys(why.next_step for why in self.refused.values() if why.next_step)
+        notes, lost = [*self.stream.notes, *self._notes()], tuple(self.stream.lost)
+        yield replace(last, notes=notes, lost=lost, next_step=" ".join(steps), ends=True)
 
     def parts(self) -> Iterator[Part]:
         """Read the file a few megabytes at a time; no more than that is held."""
@@ -361,8 +362,6 @@ class _DecodeJob:
                 "Correct the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
                 {"name": self.name, "missing": missing, "found": topics},
             )
-        if self.refused and not any(self.routes.values()):
-            raise unreadable(self.name, self.refused)
         if missing:
             self.stream.notes.append(f"What is left of the file has no topic for {', '.join(missing)}.")
 

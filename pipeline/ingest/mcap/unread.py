@@ -7,13 +7,10 @@ MCAP registry, https://mcap.dev/spec/registry, "Well-known message encodings" an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from kempf.pipeline.ingest.mcap.records import Schema
 from kempf.pipeline.ingest.messages.columns import NoReaderError
-from kempf.schemas.errors import DataRejected
 
-_READ = "JSON, CDR with definitions in ros2msg, and protobuf are read"
+_READ = "JSON, CDR and protobuf are read"
 
 #: What to do, by how messages or their definitions are written.
 _OF_ROS_1 = (
@@ -28,7 +25,7 @@ _OF_NO_DEFINITION = (
     "The recorder did not find the definition of the messages: record where their package is installed and sourced, or "
     "run `ros2 bag convert` there, which writes the definitions into the file."
 )
-_OF_OTHERS = "Let the logger write these topics in one of them."
+_OF_OTHERS = "Let the logger write these topics in JSON, CDR (ROS 2) or protobuf, with their definitions."
 
 
 def unread(encoding: str, schema: Schema | None) -> NoReaderError:
@@ -46,30 +43,11 @@ def unread(encoding: str, schema: Schema | None) -> NoReaderError:
         return NoReaderError(why, _OF_NO_DEFINITION)
     if encoding in ("cdr", "protobuf"):
         described = f"a schema in {schema.encoding}" if schema and schema.encoding else "no schema"
-        step = _OF_OTHERS
-        if encoding == "cdr":
-            step = _OF_IDL if schema and schema.encoding == "ros2idl" else _OF_NO_DEFINITION
-        return NoReaderError(f"is encoded as {encoding} with {described}; {_READ}", step)
+        if encoding == "protobuf":
+            return NoReaderError(
+                f"is encoded as protobuf with {described}; it is read with one in protobuf", _OF_OTHERS
+            )
+        step = _OF_IDL if schema and schema.encoding == "ros2idl" else _OF_NO_DEFINITION
+        return NoReaderError(f"is encoded as cdr with {described}; it is read with one in ros2msg", step)
     step = _OF_ROS_1 if encoding == "ros1" else _OF_OTHERS
     return NoReaderError(f"is encoded as {encoding or 'nothing that is named'}; {_READ}", step)
-
-
-def unreadable(name: str, refused: Mapping[str, NoReaderError]) -> DataRejected:
-    """Return the error of a log of which no topic that is asked for can be read.
-
-    Parameters
-    ----------
-    name : str
-        Name of the log.
-    refused : mapping of str to NoReaderError
-        By topic.
-    """
-    said = " ".join(f"Topic {topic} {why}." for topic, why in sorted(refused.items()))
-    steps = dict.fromkeys(why.next_step for why in refused.values() if why.next_step)
-    return DataRejected(
-        "topics_unreadable",
-        f"{name} holds no valid reading, for no topic that is asked for can be read. {said}",
-        " ".join(steps)
-        or "Correct the keys '<topic>.<field>' in the profile's source, or let the logger write other messages.",
-        {"name": name, "topics": sorted(refused)},
-    )
