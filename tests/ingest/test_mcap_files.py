@@ -38,6 +38,16 @@ def test_files_behind_each_other_are_read_like_the_file_they_were_cut_from(optio
     assert both.lost == () and both.notes == (BEHIND,)
 
 
+def test_files_in_another_order_than_that_of_their_times_are_put_in_order() -> None:
+    first, second = halves()
+    both, whole = read(second + first), read(write(plain()))
+    assert both.frame.equals(whole.frame) and both.tally == whole.tally
+    assert both.notes == (BEHIND.replace("one after the other", "in the order of their times"),)
+    # raw bytes are those of their own file
+    odd = read(second + write([*plain()[:59], ("/gyro", 5.9 / 2, b"no message")]))
+    assert odd.rejected["raw"].to_list() == ["no message"]
+
+
 def test_a_file_behind_its_copy_counts_its_messages_as_duplicates() -> None:
     data = write(plain())
     readings = read(data + data)

@@ -238,8 +238,9 @@ class _DecodeJob:
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
         """Decode the messages of one channel."""
         batch = part.batch
-        self.stream.budget.decode(int(np.sum(batch.end[record] - batch.first[record])))
-        decoded = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        payloads = Spans(batch.content, batch.first[record], batch.end[record])
+        self.stream.budget.decode(int((payloads.stop - payloads.start).sum()))
+        decoded = route.read(payloads)
         part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
         if decoded.time_ns is not None:
             timed = decoded.time_ns >= 0

@@ -1,5 +1,7 @@
 """The MCAP files of one log: mostly one, several where the parts of a split recording were put behind each other.
 
+Names of parts sort as text, bag_10 before bag_2: files that state when they begin are read in the order of that.
+
 Each has its own summary, and its own numbers for channels and schemas. Here they become one stream with one set of
 numbers; how a file is read stands in `stream`.
 
@@ -31,7 +33,7 @@ _NUMBERS = 1 << 16
 
 
 class McapFiles:
-    """One pass over the MCAP files of a log, in their order.
+    """One pass over the MCAP files of a log.
 
     Parameters
     ----------
@@ -44,7 +46,7 @@ class McapFiles:
     channels, schemas : dict by number
         Complete once `batches` has come to its end. A channel that two files describe alike has one number.
     lost : list of LostStretch
-        What could not be read, in the order of the log; complete at the end, as are the notes.
+        What could not be read, file by file; complete at the end, as are the notes.
     notes : list of str
     budget : Budget
         How much more the log may hold.
@@ -54,6 +56,9 @@ class McapFiles:
         self.budget = Budget(name, log.size)
         self._places = places_of_files(log)
         self._files = [McapStream(name, log, place, self.budget) for place in self._places]
+        order = _order([file.since_ns for file in self._files])
+        self._sorted = order != sorted(order)
+        self._places, self._files = [self._places[k] for k in order], [self._files[k] for k in order]
         # the numbers of the first file stay
         self.channels: dict[int, McapChannel] = self._files[0].channels
         self.schemas: dict[int, Schema] = self._files[0].schemas
@@ -75,7 +80,7 @@ class McapFiles:
         Yields
         ------
         Batch
-            In the order of the log.
+            In the order of each file.
 
         Raises
         ------
@@ -86,11 +91,10 @@ class McapFiles:
             for batch in file.batches():
                 yield self._renumbered(k, batch) if k else batch
             self.lost += file.lost
-            self.notes += [f"In the file from byte {begin} on: {note}" if k else note for note in file.notes]
+            self.notes += [f"In the file from byte {begin} on: {note}" if begin else note for note in file.notes]
         if len(self._files) > 1:
-            self.notes.append(
-                f"The log is {len(self._files)} MCAP files behind each other, which were read one after the other."
-            )
+            how = "in the order of their times" if self._sorted else "one after the other"
+            self.notes.append(f"The log is {len(self._files)} MCAP files behind each other, which were read {how}.")
 
     def _renumbered(self, k: int, batch: Batch) -> Batch:
         self._take_descriptions(k)
@@ -112,6 +116,13 @@ class McapFiles:
                 schema = schemas.get((k, channel.schema), above + channel.schema) if channel.schema else 0
                 described[own] = replace(channel, schema=schema)
             _give_numbers(self.channels, described, channels, k)
+
+
+def _order(since_ns: list[int | None]) -> list[int]:
+    """Return the order in which files are read, given when they begin; that of the log where one does not say it."""
+    stated = [since for since in since_ns if since is not None]
+    order = list(range(len(since_ns)))
+    return sorted(order, key=stated.__getitem__) if len(stated) == len(order) else order
 
 
 def _give_numbers(known: dict[int, T], new: dict[int, T], number_of: dict[tuple[int, int], int], k: int) -> None:

@@ -107,6 +107,11 @@ class McapStream:
         """Whether something of the file is lost."""
         return bool(self.lost)
 
+    @property
+    def since_ns(self) -> int | None:
+        """Earliest log time that the file states, ns."""
+        return self._summary.since_ns
+
     @cached_property
     def _outside_believed(self) -> bool:
         return believed(self._log, self._summary)

@@ -27,6 +27,7 @@ from kempf.pipeline.ingest.mcap.records import (
     parse_chunk_place,
     parse_footer,
     parse_schema,
+    parse_since,
     parse_statistics,
 )
 from kempf.pipeline.ingest.mcap.walk import HEAD, walk
@@ -52,6 +53,8 @@ class Summary:
     #: messages, chunk_count: How many the file should hold.
     messages: int | None = None
     chunk_count: int | None = None
+    #: Earliest log time, ns.
+    since_ns: int | None = None
     #: CRC of the data section, 0 for none; `data_end` is where its record stands.
     data_crc: int = 0
     data_end: int = -1
@@ -117,6 +120,7 @@ def _take(summary: Summary, content: bytes) -> None:
             summary.chunks.append(chunk)
         elif kind == STATISTICS:
             summary.messages, summary.chunk_count = parse_statistics(record)
+            summary.since_ns = parse_since(record)
     summary.chunks = sorted(
         {(at, size) for at, size in summary.chunks if len(MCAP_MAGIC) <= at and at + size <= summary.stop}
     )

@@ -42,6 +42,7 @@ class JsonReader:
             for part in path:
                 node = node.setdefault(part, {})
         self._elements = np.array([any(_is_index(part) for part in path) for path in self._paths], dtype=np.bool_)
+        self._listed = bool(self._elements.any())
         self._nodes, self._keys = _flat(tree, self._paths)
         #: a JSON schema need not name every field: what is missing shows in the messages
         self.missing: dict[str, str] = {}
@@ -61,11 +62,12 @@ class JsonReader:
             payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, tokens, value, columns.good
         )
         kind, first, last = tokens[..., 0], tokens[..., 1], tokens[..., 2]
-        # the compiled walk steps over lists
-        listed = (kind[:, self._elements] == ABSENT).any(axis=1) if self._elements.any() else False
-        odd = np.flatnonzero(~columns.good | listed)
+        slow = ~columns.good
+        if self._listed:
+            # the compiled walk steps over lists
+            slow |= (kind[:, self._elements] == ABSENT).any(axis=1)
         parts: dict[int, list[tuple[Index, pl.Series]]] = {slot: [] for slot in self._text}
-        for i in odd.tolist():
+        for i in np.flatnonzero(slow).tolist():
             payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
             message = _message(payload)
             columns.good[i] = message is not None
