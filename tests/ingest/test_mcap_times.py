@@ -41,6 +41,15 @@ def test_stamps_and_text_are_exact(form: Callable[[int], object], time: dict[str
     assert readings.frame["time_utc_ns"].to_list() == TRUE and readings.notes == ()
 
 
+def test_days_are_counted_as_those_of_a_spreadsheet() -> None:
+    data, given = logged(lambda ns: 45_780 + (ns - TRUE[0]) / 86_400e9, unit="d", start="1899-12-30T00:00:00Z")
+    times = read(data, given).frame["time_utc_ns"].to_list()
+    midnight = int(np.datetime64("2025-05-03", "ns").astype("int64"))
+    assert [abs(found - midnight - (true - TRUE[0])) < 1_000 for found, true in zip(times, TRUE, strict=True)] == [
+        True
+    ] * 5
+
+
 def test_text_without_a_zone_is_utc_and_a_note_says_so() -> None:
     readings = read(*logged(iso))
     assert readings.frame["time_utc_ns"].to_list() == TRUE

@@ -15,7 +15,7 @@ from kempf.schemas.profile import TimeColumn
 _SINCE_S, _UNTIL_S = 946_684_800.0, 4_102_444_800.0
 _UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
-_FORMS = "a number with `unit: s`, ms, us or ns, text as in ISO 8601 without a unit, or a stamp of sec and nanosec"
+_FORMS = "a number with `unit: s`, ms, us, ns or d, text as in ISO 8601 without a unit, or a stamp of sec and nanosec"
 
 
 @dataclass(frozen=True)

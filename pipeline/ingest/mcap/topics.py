@@ -25,7 +25,7 @@ _UNIT_WITHIN = 0.1
 
 #: What a stamp's whole seconds and nanoseconds are called: ROS 2, protobuf, ROS 1, Foxglove's JSON.
 _STAMPS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"), ("sec", "nsec"))
-_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1, "d": 86_400_000_000_000}
 _LAST = float(np.iinfo(np.int64).max)
 
 
