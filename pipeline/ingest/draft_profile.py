@@ -102,6 +102,8 @@ def draft_topics(file_name: str, topics: Mapping[str, Fields]) -> str:
             last = _words(topic.rpartition("/")[2])[0]
             said = [_words(mapped)[0]] if mapped else [name, f"{last} {name}", last]
             channel, usual = next((guess for guess in map(_guess, said) if guess[0]), ("", ""))
+            # names are those of joints, whose angles are in rad (REP-103)
+            usual = "rad" if mapped and usual == "deg" else usual
             label = f"  # {mapped!r} in the log" if mapped else ""
             lines.append(_entry(f"{topic}.{field}", channel, unit or usual) + label)
     return "\n".join(lines) + "\n"

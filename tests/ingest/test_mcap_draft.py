@@ -71,7 +71,7 @@ def test_joints_are_offered_under_the_names_that_the_log_gives_them() -> None:
     data = ros("/joint_states", JOINTS, DEFINITIONS[JOINTS], [joints])
     assert drafted(data) == {"/joint_states.position.0": "rudder_angle", "/joint_states.position.1": ""}
     lines = draft_topics("a.mcap", fields_of("a.mcap", LogFile(data))).splitlines()
-    assert lines[-1].endswith("# 'prop' in the log")
+    assert lines[-2].endswith("unit: \"rad?\"}  # 'rudder' in the log")
 
 
 @pytest.mark.parametrize("message", [b"", b"\x00\x01", b"\x00\x01\x00\x00" + bytes(8) + b"\xff" * 40])
