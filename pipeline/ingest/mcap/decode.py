@@ -231,8 +231,8 @@ class _DecodeJob:
         """Look once whether the messages of a topic that nobody asks for hold NMEA sentences."""
         if topic not in self.looked_at:
             self.looked_at.add(topic)
-            first = (batch.content[batch.first[i] : batch.end[i]].tobytes() for i in record[:_LOOKED_AT].tolist())
-            if any(sentences.holds_sentence(payload[:_HEAD]) for payload in first):
+            places = ((batch.first[i], min(batch.end[i], batch.first[i] + _HEAD)) for i in record[:_LOOKED_AT].tolist())
+            if any(sentences.holds_sentence(batch.content[first:end].tobytes()) for first, end in places):
                 self.sentences.append(topic)
 
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
@@ -320,10 +320,10 @@ class _DecodeJob:
             notes.append(f"Messages of {topic} {found or f'without {column} have log time'}.")
         notes += of_times
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
-        unmapped = sorted(set(self.places) - read - set(self.refused))
-        if unmapped:
-            more = f" and {len(unmapped) - NAMED} more" if len(unmapped) > NAMED else ""
-            notes.append(f"Topics without a channel: {', '.join(unmapped[:NAMED])}{more}.")
+        others = sorted(set(self.places) - read - set(self.refused))
+        if others:
+            more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
+            notes.append(f"Topics without a channel: {', '.join(others[:NAMED])}{more}.")
         if self.sentences:
             notes.append(f"{sentences.about(self.sentences)} {sentences.NEXT_STEP}")
         for topic, lines in self.offered.items():
