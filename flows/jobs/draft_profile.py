@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 
 from kempf.flows.jobs.files import opened_log
 from kempf.pipeline.ingest import delimited, draft_profile
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
+from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.fields import fields_of
+from kempf.pipeline.ingest.mcap.fields import fields_of, obstacles
 from kempf.pipeline.ingest.sniff import MCAP_MAGIC, SAMPLE, is_json, sniff
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError
@@ -32,6 +34,8 @@ def draft(path: Path) -> str:
         raise DataRejected("empty_log", f"{path.name} is empty.", "Copy the file again from the logger.")
     wide = utf16_of(data[:SAMPLE])
     data = as_utf8(data, wide) if wide else data
+    if (foreign := foreign_file(data)) is not None:
+        raise _no_draft(path, f"{foreign.description}, which is no log", foreign.next_step, None)
     log_format = sniff(data)
     if log_format == "mcap":
         return _of_topics(path, LogFile(data))
@@ -54,6 +58,8 @@ def _of_topics(path: Path, log: LogFile) -> str:
     if not any(topics.values()):
         listed = ", ".join(topics) or "none"
         next_step = f"Look which of its topics carries the measurements; they are {listed}."
+        for reason, step in islice(obstacles(path.name, log).items(), 1):
+            next_step = f"{reason} {step or next_step}"
         raise _no_draft(path, "an MCAP log of which no topic holds a number that can be read", next_step, "mcap")
     return draft_profile.draft_topics(path.name, topics)
 

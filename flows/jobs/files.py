@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 from pydantic import ValidationError
 
 from kempf.flows.jobs.inbox_place import PROFILES
+from kempf.pipeline.ingest.foreign_files import BAG_DESCRIPTION
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas import profile as profiles
 from kempf.schemas import quality, yaml_text
@@ -162,7 +163,8 @@ def logs_in(paths: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     Returns
     -------
     logs, profiles : tuple of Path
-        A folder's own ``profile.yaml`` says how its logs are read, and is no log.
+        A folder's own ``profile.yaml`` says how its logs are read, and is no log; nor is the ``metadata.yaml`` of a bag
+        of ROS 2.
 
     Raises
     ------
@@ -179,12 +181,22 @@ def logs_in(paths: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
         files = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p.relative_to(path)))
         own = [p for p in files if p.name in PROFILES]
         beside += own
-        logs += [p for p in files if p not in own]
-        if len(files) == len(own):
+        described = [p for p in files if p.name == "metadata.yaml" and _describes_bag(p)]
+        logs += [p for p in files if p not in own and p not in described]
+        if len(files) == len(own) + len(described):
             raise NotFound(
                 "empty_folder", f"There is no log in the folder {path}.", "Check the path.", {"path": str(path)}
             )
     return tuple(logs), tuple(beside)
+
+
+def _describes_bag(path: Path) -> bool:
+    """Return whether a file is what rosbag2 writes beside the files of a bag."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(BAG_DESCRIPTION)) == BAG_DESCRIPTION
+    except OSError:
+        return False  # taken for a log, whose reading says what is wrong
 
 
 def _hidden(path: Path) -> bool:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from kempf.flows.jobs import search_log
+from kempf.flows.jobs import search_log, split_logs
 from kempf.flows.jobs.files import opened_log
 from kempf.flows.jobs.find_segments import Ingest
 from kempf.flows.jobs.inbox_place import no_vessel
@@ -187,7 +187,16 @@ def ingest(
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
             outcomes.append(IngestOutcome(str(path), "failed", error=wrapped(error)))
     progress(len(paths), len(paths), "done")
-    return outcomes
+    return _hinted(warehouse, name, outcomes)
+
+
+def _hinted(warehouse: Warehouse, vessel: str, outcomes: list[IngestOutcome]) -> list[IngestOutcome]:
+    """Return the outcomes, with a note at the first of several logs that are parts of one recording."""
+    taken = {outcome.log_id for outcome in outcomes if outcome.error is None}
+    if len(taken) < 2:
+        return outcomes
+    hints = split_logs.hints([row for row in logs.current(warehouse, vessel) if row.log_id in taken])
+    return [replace(one, notes=(*one.notes, hints[one.log_id])) if one.log_id in hints else one for one in outcomes]
 
 
 def ingest_log(

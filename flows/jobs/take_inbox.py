@@ -37,6 +37,8 @@ _NO_FILES = (
 _PASSING = ("file_unreadable", "no_such_file", "log_unreadable", "internal")
 #: files whose outcome is stored together
 _TOGETHER = 50
+#: what rosbag2 writes beside the files of a bag, which is no log, and how these end
+_BAG_DESCRIPTION, _OF_BAGS = "metadata.yaml", (".mcap", ".mcap.zstd")
 
 
 @dataclass(frozen=True)
@@ -133,8 +135,9 @@ def take_inbox(
     register = Register(vessels.profiles(warehouse), folders.profiles, new_vessels)
     settled_ns = time.time_ns() - round(settle_s * 1e9)
     waiting, due = [], []
+    bags = {_beside_what(file) for file in files if file.name.endswith(_OF_BAGS)}
     for file in files:
-        if file.address in folders.files:
+        if file.address in folders.files or (file.name == _BAG_DESCRIPTION and _beside_what(file) in bags):
             continue
         if file.folder in folders.unreadable or file.modified_utc_ns > settled_ns:
             waiting.append(file.path)
@@ -168,6 +171,11 @@ def take_inbox(
         tuple(waiting),
         len(due) - len(todo),
     )
+
+
+def _beside_what(file: SourceFile) -> str:
+    """Return the folder that a file lies in, below the inbox."""
+    return file.path.rpartition("/")[0]
 
 
 def _gone(files: Sequence[SourceFile], before: Mapping[str, InboxFile]) -> list[InboxFile]:

@@ -162,6 +162,8 @@ class Decoded:
     lost: tuple[LostStretch, ...] = ()
     #: Why records are malformed, where they are many, the most frequent cause first; of the last part.
     misfits: tuple[Misfit, ...] = ()
+    #: What to do where no record carries a channel, for they are in an encoding that is not read; of the last part.
+    next_step: str = ""
     #: Whether no record of the log comes behind these.
     ends: bool = True
 

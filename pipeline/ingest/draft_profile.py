@@ -10,6 +10,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from kempf.schemas.profile import ChannelMap
 from kempf.schemas.units import TO_SI
 
 if TYPE_CHECKING:
@@ -89,16 +90,22 @@ def draft_topics(file_name: str, topics: Mapping[str, Fields]) -> str:
     lines = [*_head(file_name, "topics"), "    channels:  # '<topic>.<field>'; the time is that at which it was logged"]
     for topic, fields in topics.items():
         for field, mapped in fields.items():
-            if mapped is not None:
+            if isinstance(mapped, ChannelMap):
                 more = ", positive: port" if mapped.positive == "port" else ""
                 more += f", offset: {mapped.offset:.6g}" if mapped.offset else ""
                 lines.append(_entry(f"{topic}.{field}", mapped.channel, mapped.unit, more))
                 continue
-            name, unit = _words(field.rpartition(".")[2])
+            # an element of a list is called as the list is
+            name, unit = _words(
+                next(part for part in reversed(field.split(".")) if not part.isdigit() or part == field)
+            )
             last = _words(topic.rpartition("/")[2])[0]
-            guesses = [_guess(words) for words in (name, f"{last} {name}", last)]
-            channel, usual = next((guess for guess in guesses if guess[0]), ("", ""))
-            lines.append(_entry(f"{topic}.{field}", channel, unit or usual))
+            said = [_words(mapped)[0]] if mapped else [name, f"{last} {name}", last]
+            channel, usual = next((guess for guess in map(_guess, said) if guess[0]), ("", ""))
+            # names are those of joints, whose angles are in rad (REP-103)
+            usual = "rad" if mapped and usual == "deg" else usual
+            label = f"  # {mapped!r} in the log" if mapped else ""
+            lines.append(_entry(f"{topic}.{field}", channel, unit or usual) + label)
     return "\n".join(lines) + "\n"
 
 
@@ -109,7 +116,8 @@ def _head(file_name: str, contents: str) -> list[str]:
         'vessel: "?"',
         "length_m: null",
         "sources:",
-        f"  - match: {json.dumps(file_name)}",
+        # a bracket in a pattern begins a choice of signs
+        f"  - match: {json.dumps(file_name.replace('[', '[[]'))}",
     ]
 
 

@@ -61,6 +61,10 @@ class LogFile:
         for at in range(start, end, _PIECE):
             yield self.read(at, min(_PIECE, end - at))
 
+    def part(self, start: int, stop: int) -> LogFile:
+        """Return the bytes between two places as a log of its own, which reads from this one."""
+        return self if (start, stop) == (0, self.size) else _Part(self, start, stop)
+
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the bytes as they were when it was first asked for, 64 hex digits."""
@@ -68,3 +72,14 @@ class LogFile:
         for piece in self.pieces():
             digest.update(piece)
         return digest.hexdigest()
+
+
+class _Part(LogFile):
+    """Some bytes of a log that follow each other."""
+
+    def __init__(self, log: LogFile, start: int, stop: int) -> None:
+        self._log, self._start = log, start
+        self.size = min(stop, log.size) - start
+
+    def read(self, at: int, length: int) -> bytes:
+        return self._log.read(self._start + at, min(length, self.size - at)) if at < self.size else b""

@@ -12,6 +12,7 @@ from kempf.pipeline.ingest import sniff
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
 from kempf.pipeline.ingest.decoded import Decoded, Misfit
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
+from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
@@ -97,12 +98,12 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             source = source and source.model_copy(update={"encoding": "utf-8"})
         file = LogFile(content)
     log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
-    kind = sniff.no_log(file.read(0, sniff.SAMPLE))
-    if kind is not None:
+    foreign = foreign_file(file.read(0, sniff.SAMPLE))
+    if foreign is not None:
         raise DataRejected(
             "unknown_format",
-            f"{name} is {kind}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
-            "Give the log that the logger wrote, or export it as one of these. " + _SEE_PROFILE,
+            f"{name} is {foreign.description}, which is no log; expected MCAP, NMEA 0183 or delimited text.",
+            f"{foreign.next_step} {_SEE_PROFILE}",
             {"name": name},
         )
     if log_format is None:
@@ -132,7 +133,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             yield clocks.set_right(checked)
             continue
         if summary.tally.records_kept == 0:
-            raise _nothing(name, checked, summary, decoded.misfits)
+            raise _nothing(name, checked, summary, decoded)
         own = (*summary.notes(decoded.misfits), *notes, *dated.notes, *checked.notes, *clocks.notes())
         yield replace(clocks.set_right(checked), notes=own)
 
@@ -250,7 +251,9 @@ def _whole(name: str, log: LogFile) -> bytes:
     return log.whole()
 
 
-def _nothing(name: str, last: Readings, summary: _Summary, misfits: tuple[Misfit, ...]) -> DataRejected:
+def _nothing(name: str, last: Readings, summary: _Summary, decoded: Decoded) -> DataRejected:
+    """Return the error of a log that holds nothing; ``last`` and ``decoded`` are its last part, checked and before."""
+    misfits = decoded.misfits
     counts = summary.tally.by_reason
     listed = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda c: (-c[1], c[0])))
     years = ""
@@ -265,7 +268,8 @@ def _nothing(name: str, last: Readings, summary: _Summary, misfits: tuple[Misfit
         else "See whether the profile says how time and columns are written. " + _SEE_PROFILE,
         "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
-        "no_channel": "The log holds none of the canonical channels: check that it is the right file.",
+        "no_channel": decoded.next_step
+        or "The log holds none of the canonical channels: check that it is the right file.",
     }
     most = max(sorted(counts), key=lambda reason: counts[reason]) if counts else ""
     return DataRejected(

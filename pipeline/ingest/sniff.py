@@ -10,19 +10,6 @@ Format = Literal["delimited", "mcap", "nmea"]
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
-#: Documents and pictures that are handed over for a log now and then, by how they begin.
-_NO_LOGS = (
-    (b"%PDF-", "a PDF document"),
-    (b"PK\x03\x04", "a zip archive, as a workbook (.xlsx) is"),
-    (b"\x89PNG\r\n", "a PNG picture"),
-    (b"\xff\xd8\xff", "a JPEG picture"),
-    (b"\xd0\xcf\x11\xe0", "an old Office document"),
-    (b"{\\rtf", "an RTF document"),
-)
-
-#: Where a tar archive says that it is one.
-_TAR, _TAR_AT = b"ustar", 257
-
 #: NUL bytes in a row that a logger left behind that lost its power; fewer are binary data.
 _LEFT_BEHIND = re.compile(rb"\0{16,}")
 
@@ -55,19 +42,6 @@ def sniff(data: bytes) -> Format | None:
     if sample.strip() and odd <= len(sample) // 1000:
         return "delimited"
     return None
-
-
-def no_log(data: bytes) -> str | None:
-    """Return what a file is that is known and no log; None for any other.
-
-    Examples
-    --------
-    >>> no_log(b"%PDF-1.7 trial report")
-    'a PDF document'
-    """
-    if data.startswith(_TAR, _TAR_AT):
-        return "a tar archive"
-    return next((words for begin, words in _NO_LOGS if data.startswith(begin)), None)
 
 
 def is_json(data: bytes) -> bool:

@@ -58,6 +58,16 @@ def test_what_is_new_gets_in_once_and_what_is_no_log_waits_for_a_person(place: P
         dismiss(warehouse, "minutes.pdf", " ")
 
 
+def test_the_description_of_a_bag_waits_for_nobody(place: Path, warehouse: Warehouse) -> None:
+    bag = place / "mariner" / "bag"
+    bag.mkdir()
+    (bag / "bag_0.mcap").write_bytes(b"")
+    for folder in (bag, place / "mariner"):
+        (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 5\n")
+    held = {one.address.removeprefix(f"{place}/mariner/") for one in taken(place, warehouse).quarantined}
+    assert held == {"minutes.pdf", "bag/bag_0.mcap", "metadata.yaml"}
+
+
 def test_a_slip_of_the_hand_makes_no_ship_and_is_released_by_one_command(
     place: Path, mariner: Ship, warehouse: Warehouse
 ) -> None:

@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import sentences
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.files import McapFiles
+from kempf.pipeline.ingest.mcap.odd_times import OddTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
-from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.mcap.topics import Route
+from kempf.pipeline.ingest.mcap.unmapped import NAMED, unmapped
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError
@@ -25,8 +28,8 @@ T = TypeVar("T", bound=np.generic)
 
 _TIMES = ("log_time", "publish_time")
 
-#: Topics that are named in a message to a person, at most.
-_NAMED = 20
+#: Messages of a topic in which NMEA sentences are looked for, and bytes of each.
+_LOOKED_AT, _HEAD = 3, 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +140,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     yield from _DecodeJob(name, log, source).run(patterns)
 
 
-def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -> set[str]:
+def _topics(name: str, log: LogFile, source: Source | None, known: McapFiles) -> set[str]:
     """Return the topics of a file, as far as they decide to which of them a key of the profile belongs.
 
     The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not list the topics, the
@@ -145,7 +148,7 @@ def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -
     """
     channels = known.channels
     if not channels and any(key.count(".") > 1 for key in (source.channels if source else ())):
-        stream = McapStream(name, log)
+        stream = McapFiles(name, log)
         for _ in stream.batches():
             pass
         channels = stream.channels
@@ -157,7 +160,7 @@ class _DecodeJob:
 
     def __init__(self, name: str, log: LogFile, source: Source | None) -> None:
         self.name, self.log, self.source = name, log, source
-        self.stream = McapStream(name, log)
+        self.stream = McapFiles(name, log)
         self.topics = _topics(name, log, source, self.stream)
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
@@ -166,12 +169,13 @@ class _DecodeJob:
         self.time_field = time if time and time.column and time.column not in _TIMES else None
         self.routes: dict[int, Route | None] = {}
         self.made: dict[McapChannel, Route | None] = {}
-        self.refused: dict[str, str] = {}
+        self.refused: dict[str, NoReaderError] = {}
         self.seen: dict[str, set[str]] = {}
         self.timed, self.untimed = False, set[str]()
         self.places: dict[str, int] = {}
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
+        self.looked_at, self.sentences = set[str](), list[str]()
 
     def _owners(self) -> dict[str, tuple[str, str]]:
         """Split the profile's keys into topic and field: the longest topic that fits."""
@@ -193,7 +197,9 @@ class _DecodeJob:
                 first, waiting = first + waiting.size, _Waiting()
         self.require_something(patterns)
         last = waiting.decoded(self.log, first, tuple(self.places))
-        yield replace(last, notes=[*self.stream.notes, *self._notes()], lost=tuple(self.stream.lost), ends=True)
+        steps = dict.fromkeys(why.next_step for why in self.refused.values() if why.next_step)
+        notes, lost = [*self.stream.notes, *self._notes()], tuple(self.stream.lost)
+        yield replace(last, notes=notes, lost=lost, next_step=" ".join(steps), ends=True)
 
     def parts(self) -> Iterator[Part]:
         """Read the file a few megabytes at a time; no more than that is held."""
@@ -216,14 +222,25 @@ class _DecodeJob:
                 part.reason[record] = CODE[Reason.MALFORMED]
             elif (route := self._route(number, channel)) is None:
                 part.reason[record] = CODE[Reason.NO_CHANNEL]
+                self._look_for_sentences(channel.topic, batch, record)
             else:
                 self._read(part, record, channel.topic, route)
         return part
 
+    def _look_for_sentences(self, topic: str, batch: Batch, record: NDArray[np.int64]) -> None:
+        """Look once whether the messages of a topic that nobody asks for hold NMEA sentences."""
+        if topic not in self.looked_at:
+            self.looked_at.add(topic)
+            places = ((batch.first[i], min(batch.end[i], batch.first[i] + _HEAD)) for i in record[:_LOOKED_AT].tolist())
+            if any(sentences.holds_sentence(batch.content[first:end].tobytes()) for first, end in places):
+                self.sentences.append(topic)
+
     def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
         """Decode the messages of one channel."""
         batch = part.batch
-        decoded = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        payloads = Spans(batch.content, batch.first[record], batch.end[record])
+        self.stream.budget.decode(int((payloads.stop - payloads.start).sum()))
+        decoded = route.read(payloads)
         part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
         if decoded.time_ns is not None:
             timed = decoded.time_ns >= 0
@@ -267,7 +284,7 @@ class _DecodeJob:
         try:
             return Route(channel, schema, mapped, self.time_field)
         except NoReaderError as why:
-            self.refused[channel.topic] = str(why)
+            self.refused[channel.topic] = why
             return None
 
     def _refuse_late_owner(self, before: dict[str, tuple[str, str]], topic: str) -> None:
@@ -296,34 +313,40 @@ class _DecodeJob:
                     absent[topic, key] = f"No message of {topic} has the field {key}{f': {why}' if why else ''}."
         notes += absent.values()
         assert self.time_field is not None or not self.untimed
+        odd, of_times = self._odd_times(), dict.fromkeys(n for r in self.routes.values() if r for n in r.time_notes)
         for topic in sorted(self.untimed):
-            notes.append(
-                f"Messages of {topic} without {self.time_field.column if self.time_field else ''} have log time."
-            )
+            column = self.time_field.column if self.time_field else ""
+            found = f"have log time where {column} is no time, such as {odd[topic].found}" if topic in odd else ""
+            notes.append(f"Messages of {topic} {found or f'without {column} have log time'}.")
+        notes += of_times
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
-        unmapped = sorted(set(self.places) - read - set(self.refused))
-        if unmapped:
-            more = f" and {len(unmapped) - _NAMED} more" if len(unmapped) > _NAMED else ""
-            notes.append(f"Topics without a channel: {', '.join(unmapped[:_NAMED])}{more}.")
+        others = sorted(set(self.places) - read - set(self.refused))
+        if others:
+            more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
+            notes.append(f"Topics without a channel: {', '.join(others[:NAMED])}{more}.")
+        if self.sentences:
+            notes.append(f"{sentences.about(self.sentences)} {sentences.NEXT_STEP}")
         for topic, lines in self.offered.items():
             notes.append(f"Topic {topic} is mapped so if its axes are those of REP-103: {lines}.")
         return notes
 
+    def _odd_times(self) -> dict[str, OddTime]:
+        """Return by topic the first time of its messages that is not written as the profile says."""
+        routes = ((self.stream.channels[number].topic, route) for number, route in self.routes.items())
+        return {topic: route.odd_time for topic, route in routes if route and route.odd_time}
+
     def require_something(self, patterns: list[str]) -> None:
         """Refuse a file of which nothing was asked that it has."""
         topics = sorted({channel.topic for channel in self.stream.channels.values()})
-        named = ", ".join(topics[:_NAMED]) or "none"
+        named = ", ".join(topics[:NAMED]) or "none"
         if not self.keys and not self.taken:
-            offers = " ".join(lines for _, lines in sorted(self.offered.items()))
-            raise UsageError(
-                "no_source_for_log",
-                f"{self.name} is an MCAP file, for which the profile maps no topic; its topics are {named}.",
-                f"`kempf profile draft {self.name}` writes a source to complete, which maps '<topic>.<field>' to "
-                "channels. See docs/profile.md." + (f" With axes as in REP-103: {offers}." if offers else ""),
-                {"name": self.name, "topics": topics, "patterns": patterns},
-            )
+            offers = [lines for _, lines in sorted(self.offered.items())]
+            fits = self.source is not None
+            raise unmapped(self.name, topics, patterns, fits=fits, offers=offers, spoken=self.sentences)
         if self.time_field is not None and not self.timed:
-            column = self.time_field.column
+            column = self.time_field.column or ""
+            for topic, odd in self._odd_times().items():
+                raise odd.refusal(self.name, column, topic)
             raise UsageError(
                 "no_time_column",
                 f"The source for {self.name} takes its time from {column!r}, which no message that it maps has; "

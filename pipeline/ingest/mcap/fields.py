@@ -5,22 +5,42 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from itertools import islice
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import sentences
+from kempf.pipeline.ingest.mcap.files import McapFiles
+from kempf.pipeline.ingest.mcap.joint_names import joint_names
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
-from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.mcap.topics import reader_of
 from kempf.pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.spans import Spans, as_bytes
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
 from kempf.schemas.profile import ChannelMap
 
 #: Stretches of the file in which a message of every topic is looked for, and how deep its fields may lie.
 _MOST, _DEEPEST = 8, 8
 
-#: Field -> the channel that it is by the definition of its message; None where nobody but a person knows.
-Fields = dict[str, ChannelMap | None]
+#: Messages of each channel that are looked at, for a first one may be empty.
+_MESSAGES = 16
+
+#: Longest list whose elements are offered one by one; a longer one is a matrix, a scan or a picture.
+_LONGEST = 8
+
+#: What says when or the how-many-eth a message is, and not what was measured.
+_TIMES = frozenset(
+    (
+        *("header", "stamp", "timestamp", "status", "time", "t", "utc", "epoch", "sec", "nsec", "nanosec"),
+        *("secs", "nsecs", "seq", "sequence", "counter", "id"),
+    )
+)
+
+#: Field -> the channel that it is by the definition of its message, or the name that the log gives it; None where
+#: nobody but a person knows.
+Fields = dict[str, ChannelMap | str | None]
 
 
 def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
@@ -37,7 +57,7 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
     DataRejected
         The file unpacks to far more than a log of its size holds.
     """
-    stream = McapStream(name, log)
+    stream = McapFiles(name, log)
     first = _first_messages(stream)
     topics: dict[str, Fields] = {}
     for number, channel in stream.channels.items():
@@ -45,30 +65,57 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
         kind = plain_name(schema.name) if schema else ""
         known: dict[str, ChannelMap] = TAKEN.get(kind, {}) | OFFERED.get(kind, {})
         fields: Fields = dict(known)
-        fields.update(dict.fromkeys(k for k in numbers_of(channel, schema, first.get(number)) if k not in fields))
+        for message in first.get(number, [b""]):
+            fields = fields | {k: None for k in numbers_of(channel, schema, message) if k not in fields}
+            if kind == "sensor_msgs/JointState":
+                named = {str(k): name for k, name in enumerate(joint_names(message))}
+                fields |= {key: named.get(key.rpartition(".")[2]) for key, one in fields.items() if one is None}
         topics.setdefault(channel.topic, {}).update(fields)
     return dict(sorted(topics.items()))
 
 
-def _first_messages(stream: McapStream) -> dict[int, bytes]:
-    """Return the first message of every channel that has one in the first stretches of the file."""
-    first: dict[int, bytes] = {}
+def obstacles(name: str, log: LogFile) -> dict[str, str]:
+    """Return why topics hold no number that can be read, as sentences, each with what to do.
+
+    Parameters
+    ----------
+    name, log
+        See `fields_of`.
+    """
+    stream = McapFiles(name, log)
+    found, spoken = {}, set()
+    for number, messages in _first_messages(stream).items():
+        if (channel := stream.channels.get(number)) is None:
+            continue
+        if any(map(sentences.holds_sentence, messages)):
+            spoken.add(channel.topic)
+        try:
+            reader_of(channel, stream.schemas.get(channel.schema), [], [])
+        except NoReaderError as why:
+            found[f"Topic {channel.topic} {why}."] = why.next_step
+    return {sentences.about(spoken): sentences.NEXT_STEP} | found if spoken else found
+
+
+def _first_messages(stream: McapFiles) -> dict[int, list[bytes]]:
+    """Return the first messages of every channel that has some in the first stretches of the file."""
+    first: dict[int, list[bytes]] = {}
     for batch in islice(stream.batches(), _MOST):
-        numbers, places = np.unique(batch.channel, return_index=True)
-        for number, at in zip(numbers.tolist(), places.tolist(), strict=True):
-            first.setdefault(number, batch.content[batch.first[at] : batch.end[at]].tobytes())
+        for number in np.unique(batch.channel).tolist():
+            own = first.setdefault(number, [])
+            for at in np.flatnonzero(batch.channel == number)[: _MESSAGES - len(own)].tolist():
+                own.append(batch.content[batch.first[at] : batch.end[at]].tobytes())
         if first.keys() >= stream.channels.keys():
             break
     return first
 
 
 def numbers_of(channel: McapChannel, schema: Schema | None, message: bytes | None) -> Iterator[str]:
-    """Yield the fields that hold a number, but for time stamps."""
+    """Yield the fields of a message that hold a number, but for times and counters."""
     try:
         if channel.encoding == "json":
             yield from _of_json(json.loads(message or b"{}"), "", 0)
         elif schema and (channel.encoding, schema.encoding) == ("cdr", "ros2msg"):
-            yield from _of_cdr(schema)
+            yield from _of_cdr(schema, message or b"")
         elif schema and channel.encoding == schema.encoding == "protobuf":
             yield from _of_protobuf(schema)
     except (NoReaderError, ValueError, RecursionError):
@@ -80,18 +127,31 @@ def _of_json(value: Any, path: str, depth: int) -> Iterator[str]:
         for key, below in value.items():
             if not _is_time(key):
                 yield from _of_json(below, f"{path}.{key}" if path else key, depth + 1)
-    elif path and isinstance(value, int | float) and not isinstance(value, bool):
+    elif path and isinstance(value, list) and len(value) <= _LONGEST and depth < _DEEPEST:
+        for k, below in enumerate(value):
+            yield from _of_json(below, f"{path}.{k}", depth + 1)
+    elif path and _is_number(value):
         yield path
 
 
-def _of_cdr(schema: Schema) -> Iterator[str]:
+def _is_number(value: Any) -> bool:
+    """Return whether a value is read as a number, be it as text."""
+    try:
+        return not isinstance(value, bool) and isinstance(value, int | float | str) and isfinite(float(value))
+    except (ValueError, OverflowError):
+        return False
+
+
+def _of_cdr(schema: Schema, message: bytes) -> Iterator[str]:
     from kempf.pipeline.ingest.messages.cdr_definition import PRIMITIVES, full_name, types_of
 
     types = types_of(schema.name, schema.data.decode("utf-8", errors="replace"))
 
     def below(name: str, path: str, depth: int) -> Iterator[str]:
         for own in types[name] if depth < _DEEPEST else ():
-            if own.count is None and not _is_time(own.name):
+            if own.count is not None and own.kind in PRIMITIVES and not own.name.endswith("covariance"):
+                yield from _elements(schema, f"{path}{own.name}", own.count, message)
+            elif own.count is None and not _is_time(own.name) and own.kind != "std_msgs/MultiArrayLayout":
                 if own.kind in PRIMITIVES:
                     yield path + own.name
                 elif own.kind == "geometry_msgs/Quaternion":
@@ -100,6 +160,23 @@ def _of_cdr(schema: Schema) -> Iterator[str]:
                     yield from below(own.kind, f"{path}{own.name}.", depth + 1)
 
     yield from below(full_name(schema.name, ""), "", 0)
+
+
+def _elements(schema: Schema, path: str, count: int, message: bytes) -> Iterator[str]:
+    """Yield the elements of a list of numbers; of one of any length (-1) those that a message has."""
+    if count < 0 and message:
+        from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
+
+        # one more tells a list that is too long
+        wanted = [f"{path}.{k}" for k in range(_LONGEST + 1)]
+        try:
+            reader = CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)
+        except NoReaderError:
+            return
+        payload = Spans(as_bytes(message), np.zeros(1, dtype=np.int64), np.full(1, len(message)))
+        count = int(reader.read(payload).present.sum())
+    if count <= _LONGEST:
+        yield from (f"{path}.{k}" for k in range(count))
 
 
 def _of_protobuf(schema: Schema) -> Iterator[str]:
@@ -119,4 +196,4 @@ def _of_protobuf(schema: Schema) -> Iterator[str]:
 
 
 def _is_time(key: str) -> bool:
-    return key in ("header", "stamp", "timestamp", "status")
+    return key.lower() in _TIMES

@@ -21,6 +21,8 @@ FIRST_PRIVATE = 0x80
 
 #: Counts of messages, schemas, channels, attachments, metadata and chunks.
 _STATISTICS = struct.Struct("<QHIIII")
+#: Earliest log time, behind them.
+_SINCE = struct.Struct("<Q")
 
 #: Content of a footer, and of a data end as it is written today, bytes.
 FOOTER_SIZE, DATA_END_SIZE = 20, 4
@@ -97,6 +99,13 @@ def parse_statistics(content: bytes) -> tuple[int, int] | tuple[None, None]:
         return None, None
     messages, _, _, _, _, chunks = _STATISTICS.unpack_from(content, 0)
     return messages, chunks
+
+
+def parse_since(content: bytes) -> int | None:
+    """Return the earliest log time that a statistics record states, ns; None where it counts no message."""
+    if len(content) < _STATISTICS.size + _SINCE.size or not _STATISTICS.unpack_from(content, 0)[0]:
+        return None
+    return int(_SINCE.unpack_from(content, _STATISTICS.size)[0])
 
 
 def parse_chunk_place(content: bytes) -> tuple[int, int] | None:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
+from kempf.pipeline.ingest.mcap.budget import Budget
 from kempf.pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -38,12 +39,12 @@ from kempf.pipeline.ingest.mcap.records import (
     parse_schema,
     unpacked,
 )
+from kempf.pipeline.ingest.mcap.seams import end_of_file
 from kempf.pipeline.ingest.mcap.summary import read_summary
 from kempf.pipeline.ingest.mcap.unchunked import FIRST_WINDOW, WINDOW, believed, chunk_behind
 from kempf.pipeline.ingest.mcap.walk import HEAD, walk
 from kempf.pipeline.ingest.sniff import MCAP_MAGIC
 from kempf.pipeline.ingest.spans import Index, as_bytes
-from kempf.pipeline.ingest.unpack import allowance, too_large, too_many
 
 #: Bytes that are known of a message whose chunk is lost: two places, its channel, two times.
 _HEADS = 40
@@ -64,8 +65,12 @@ class McapStream:
     Parameters
     ----------
     name : str
-        Name of the file, for messages.
+        Name of the log, for messages.
     log : LogFile
+    place : (int, int), optional
+        First byte of the file in the log, and the one behind its last; the whole log if left out.
+    budget : Budget, optional
+        How much more the log may hold; that of a whole log if left out.
 
     Attributes
     ----------
@@ -78,9 +83,13 @@ class McapStream:
         Whether the file is cut or damaged.
     """
 
-    def __init__(self, name: str, log: LogFile) -> None:
-        self._name, self._log = name, log
-        self._summary = read_summary(log)
+    def __init__(
+        self, name: str, log: LogFile, place: tuple[int, int] | None = None, budget: Budget | None = None
+    ) -> None:
+        self._begin, end = place or (0, log.size)
+        self._log = log.part(self._begin, end)
+        self._budget = budget or Budget(name, log.size)
+        self._summary = read_summary(self._log)
         self.channels: dict[int, McapChannel] = dict(self._summary.channels)
         self.schemas: dict[int, Schema] = dict(self._summary.schemas)
         self.lost: list[LostStretch] = []
@@ -88,7 +97,6 @@ class McapStream:
         self._length = dict(self._summary.chunks)
         self._expected = np.array(sorted(self._length), dtype=np.int64)
         self._lengths = np.array([self._length[at] for at in sorted(self._length)], dtype=np.int64)
-        self._room, self._records_left = allowance(log.size)
         self._crc: int | None = 0 if self._summary.data_end < 0 or self._summary.data_crc else None
         self._crc_to = 0
         self._last_ns: int | None = None
@@ -98,6 +106,11 @@ class McapStream:
     def partial(self) -> bool:
         """Whether something of the file is lost."""
         return bool(self.lost)
+
+    @property
+    def since_ns(self) -> int | None:
+        """Earliest log time that the file states, ns."""
+        return self._summary.since_ns
 
     @cached_property
     def _outside_believed(self) -> bool:
@@ -139,12 +152,7 @@ class McapStream:
 
     def _count(self, batch: Batch) -> None:
         self._read += batch.first.size
-        self._records_left -= batch.first.size
-        self._room -= batch.content.size
-        if self._room < 0:
-            raise too_large(self._name, allowance(self._log.size)[0])
-        if self._records_left < 0:
-            raise too_many(self._name, allowance(self._log.size)[1])
+        self._budget.unpack(0, batch.first.size)
         if batch.log_time.size and not batch.lost:
             self._last_ns = int(batch.log_time.max())
 
@@ -227,7 +235,7 @@ class McapStream:
             loose = loose_from + np.flatnonzero(opcode[loose_from:i] == MESSAGE)
             if loose.size:
                 low, high = int(first[loose[0]]), int(end[loose[-1]])
-                piece = Piece(at + low, high - low, packed=False, size=high - low)
+                piece = Piece(self._begin + at + low, high - low, packed=False, size=high - low)
                 yield messages_of(buffer[low:high], first[loose] - low, end[loose] - low, piece)
             loose_from = i + 1
             if i < opcode.size:
@@ -238,6 +246,10 @@ class McapStream:
                     self._describe(int(opcode[i]), bytes(content))
 
     def _chunk(self, place: int, content: memoryview) -> Iterator[Batch]:
+        head = head_of(content)
+        if head is not None and head.size <= CHUNK_LIMIT:
+            # before it is known whether it is whole and holds messages: unpacking costs the same
+            self._budget.unpack(head.size, 0)
         try:
             records = unpacked(content, CHUNK_LIMIT)
         except DamagedChunkError as why:
@@ -251,10 +263,9 @@ class McapStream:
             self._describe(int(opcode[i]), records[first[i] : end[i]])
         message = opcode == MESSAGE
         if message.any():
-            piece = Piece(place, HEAD + len(content), packed=True, size=buffer.size)
+            piece = Piece(self._begin + place, HEAD + len(content), packed=True, size=buffer.size)
             yield messages_of(buffer, first[message], end[message], piece)
         if reached < buffer.size:
-            head = head_of(content)
             until = head.until_ns if head else None
             self._note_chunk(
                 place, stretch(self._last_ns, until, None, f"its records are damaged from byte {reached} on")
@@ -331,9 +342,29 @@ class McapStream:
             self._lose(
                 LostStretch(None, None, None, why), f"Something in the file is damaged, and nothing says where: {why}."
             )
-        if not self._summary.ended:
+        if not self._summary.stands_right:
+            self._say_what_follows(at + end)
+
+    def _say_what_follows(self, at: int) -> None:
+        """Say what stands behind the end of the file, or that its end is missing, where its summary is of no use.
+
+        Parameters
+        ----------
+        at : int
+            Behind the data section.
+        """
+        behind = end_of_file(self._log, at)
+        left = 0 if behind is None else self._log.size - behind
+        if behind is not None and left:
+            if any(piece.count(0) < len(piece) for piece in self._log.pieces(behind)):
+                why = f"{left} bytes stand behind the end of the MCAP file, which are no MCAP file"
+                self._lose(stretch(self._last_ns, None, None, why), f"Not read: {why}.")
+            else:
+                # of a copier, or of a disk that was reserved
+                self.notes.append(f"{left} bytes behind the end of the MCAP file are zero and were left out.")
+        elif not self._summary.ended:
             self.notes.append("The end of the file is missing; its data section is whole.")
-            self._summary.ended = True
+        self._summary.ended = True
 
 
 def _alone(opcode: int, length: int) -> tuple[NDArray[np.uint8], Index, Index]:

@@ -27,6 +27,7 @@ from kempf.pipeline.ingest.mcap.records import (
     parse_chunk_place,
     parse_footer,
     parse_schema,
+    parse_since,
     parse_statistics,
 )
 from kempf.pipeline.ingest.mcap.walk import HEAD, walk
@@ -52,9 +53,13 @@ class Summary:
     #: messages, chunk_count: How many the file should hold.
     messages: int | None = None
     chunk_count: int | None = None
+    #: Earliest log time, ns.
+    since_ns: int | None = None
     #: CRC of the data section, 0 for none; `data_end` is where its record stands.
     data_crc: int = 0
     data_end: int = -1
+    #: Whether it stands where the footer says, right behind the data section, and ends with the file.
+    stands_right: bool = False
     notes: list[str] = field(default_factory=list)
 
 
@@ -87,6 +92,7 @@ def read_summary(log: LogFile) -> Summary:
         return summary
     summary.stop = footer.summary_start
     _take(summary, content)
+    summary.stands_right = summary.data_end >= 0 and not summary.notes
     return summary
 
 
@@ -114,6 +120,7 @@ def _take(summary: Summary, content: bytes) -> None:
             summary.chunks.append(chunk)
         elif kind == STATISTICS:
             summary.messages, summary.chunk_count = parse_statistics(record)
+            summary.since_ns = parse_since(record)
     summary.chunks = sorted(
         {(at, size) for at, size in summary.chunks if len(MCAP_MAGIC) <= at and at + size <= summary.stop}
     )

@@ -8,9 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.mapping import check_once
+from kempf.pipeline.ingest.mcap.odd_times import OddTime, odd_time
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
-from kempf.pipeline.ingest.messages.columns import Columns, MessageReader, NoReaderError
+from kempf.pipeline.ingest.mcap.unread import unread
+from kempf.pipeline.ingest.messages.columns import Columns, MessageReader
 from kempf.pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.text.row_times import text_instants
 from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
 from kempf.schemas.profile import ChannelMap, TimeColumn, start_ns
 
@@ -20,9 +23,9 @@ _ANGLES = ("yaw", "pitch", "roll")
 #: How far the length of a quaternion may be from one.
 _UNIT_WITHIN = 0.1
 
-#: What a stamp's whole seconds and nanoseconds are called: ROS 2, protobuf, ROS 1.
-_STAMPS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"))
-_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
+#: What a stamp's whole seconds and nanoseconds are called: ROS 2, protobuf, ROS 1, Foxglove's JSON.
+_STAMPS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"), ("sec", "nsec"))
+_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1, "d": 86_400_000_000_000}
 _LAST = float(np.iinfo(np.int64).max)
 
 
@@ -74,7 +77,11 @@ class Route:
         if time is not None:
             wanted |= dict.fromkeys([self._clock, *(f"{self._clock}.{p}" for pair in _STAMPS for p in pair)])
         self._wanted = list(wanted)
-        self._reader = _reader(channel, schema, self._wanted)
+        self._reader = reader_of(channel, schema, self._wanted, [self._clock] if time is not None else [])
+        #: the first time of its messages that is none, if one was read that is not as the profile says
+        self.odd_time: OddTime | None = None
+        #: what a person should know of the times
+        self.time_notes: list[str] = []
         lacks = self._reader.missing
         #: mapped fields that no message can have, each with why
         self.absent = {k: lacks[k] for k in mapped if k in lacks and (not _parts(k) or set(_parts(k)) & set(lacks))}
@@ -121,6 +128,12 @@ class Route:
             with np.errstate(invalid="ignore"):
                 usable = has_second & has_nano & (second >= 0) & (second < _LAST / 1e9) & (nano >= 0) & (nano < 1e9)
             time[usable] = second[usable].astype(np.int64) * 1_000_000_000 + nano[usable].astype(np.int64)
+        slot = self._wanted.index(self._clock)
+        if self._time.unit is None and slot in columns.text:
+            at, text = columns.text[slot]
+            instant, good = text_instants(text.str.strip_chars(), self._time, self.time_notes)
+            time[at[good]] = instant[good]
+        self.odd_time = self.odd_time or odd_time(columns, slot, time, self._time)
         return time
 
 
@@ -150,14 +163,25 @@ def _angle(
     return np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
-def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str]) -> MessageReader:
-    """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles."""
+def reader_of(channel: McapChannel, schema: Schema | None, wanted: list[str], text: list[str]) -> MessageReader:
+    """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles.
+
+    Parameters
+    ----------
+    text : list of str
+        Fields whose text may be a time.
+
+    Raises
+    ------
+    NoReaderError
+        The messages cannot be read; says why, and what to do.
+    """
     schema_encoding = schema.encoding if schema else ""
     if channel.encoding == "json":
         from kempf.pipeline.ingest.messages.json_reader import JsonReader
 
-        return JsonReader(wanted)
-    if channel.encoding == "cdr" and schema and schema_encoding == "ros2msg":
+        return JsonReader(wanted, text)
+    if channel.encoding == "cdr" and schema and schema_encoding == "ros2msg" and schema.data.strip():
         from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
 
         return CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)
@@ -165,7 +189,4 @@ def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str]) -> M
         from kempf.pipeline.ingest.messages.protobuf_reader import ProtobufReader
 
         return ProtobufReader(schema.name, schema.data, wanted)
-    if channel.encoding in ("cdr", "protobuf"):
-        described = f"a schema in {schema_encoding}" if schema_encoding else "no schema"
-        raise NoReaderError(f"is encoded as {channel.encoding} with {described}")
-    raise NoReaderError(f"is encoded as {channel.encoding or 'nothing that is named'}; JSON, CDR and protobuf are read")
+    raise unread(channel.encoding, schema)

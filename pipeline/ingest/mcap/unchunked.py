@@ -80,17 +80,19 @@ def _begins_with_messages(log: LogFile, stop: int) -> bool:
         if end > stop:
             return False
         # a file may be attached that has chunks of its own
-        whole = head[0] == ATTACHMENT and _attached(log, at + HEAD, end)
+        whole = head[0] == ATTACHMENT and attachment_is_whole(log, at + HEAD, end)
         if not whole and chunk_behind(log, at + HEAD, end, stop) >= 0:
             return False
         at = end
     return False
 
 
-def _attached(log: LogFile, first: int, end: int) -> bool:
-    """Return whether the content of an attachment has a CRC that is right."""
+def attachment_is_whole(log: LogFile, first: int, end: int, *, without_crc: bool = False) -> bool:
+    """Return whether the content of an attachment has a CRC that is right, or none where that is enough."""
     stored_crc = log.read(end - 4, 4) if end - first >= 4 else b""
-    return stored_crc not in (b"", bytes(4)) and _crc(log, first, end - 4) == struct.unpack("<I", stored_crc)[0]
+    if stored_crc == bytes(4):
+        return without_crc
+    return stored_crc != b"" and _crc(log, first, end - 4) == struct.unpack("<I", stored_crc)[0]
 
 
 def _crc(log: LogFile, first: int, end: int) -> int:

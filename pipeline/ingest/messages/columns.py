@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.spans import Spans
@@ -21,6 +22,8 @@ class Columns:
     present: NDArray[np.bool_]
     #: Shape (m,). Which messages could be decoded.
     good: NDArray[np.bool_]
+    #: By field, where its text is asked for: which messages have text that is no number, shape (t,), ascending, and it.
+    text: dict[int, tuple[NDArray[np.int64], pl.Series]] = field(default_factory=dict)
 
     @classmethod
     def empty(cls, fields: int, messages: int) -> Columns:
@@ -44,4 +47,16 @@ class MessageReader(Protocol):
 
 
 class NoReaderError(Exception):
-    """Messages of a channel cannot be read; says why."""
+    """Messages of a channel cannot be read.
+
+    Parameters
+    ----------
+    why : str
+        What of them; the topic stands before it.
+    next_step : str, optional
+        What to do.
+    """
+
+    def __init__(self, why: str, next_step: str = "") -> None:
+        super().__init__(why)
+        self.next_step = next_step

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.messages.columns import Columns
 from kempf.pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
-from kempf.pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import number
+
+#: Most digits of the place of an element.
+_LONGEST_INDEX = 9
 
 #: A tree of field names; the leaves are empty.
 Tree = dict[str, "Tree"]
@@ -23,16 +28,21 @@ class JsonReader:
     Parameters
     ----------
     wanted : list of str
-        Fields, nested ones with dots.
+        Fields, nested ones with dots; a number is an element of a list, counted from 0, or a key that reads so.
+    text : list of str
+        Those whose text is wanted too where it is no number.
     """
 
-    def __init__(self, wanted: list[str]) -> None:
+    def __init__(self, wanted: list[str], text: Collection[str] = ()) -> None:
+        self._text = [slot for slot, name in enumerate(wanted) if name in text]
         self._paths = [name.split(".") for name in wanted]
         tree: Tree = {}
         for path in self._paths:
             node = tree
             for part in path:
                 node = node.setdefault(part, {})
+        self._elements = np.array([any(_is_index(part) for part in path) for path in self._paths], dtype=np.bool_)
+        self._listed = bool(self._elements.any())
         self._nodes, self._keys = _flat(tree, self._paths)
         #: a JSON schema need not name every field: what is missing shows in the messages
         self.missing: dict[str, str] = {}
@@ -52,36 +62,83 @@ class JsonReader:
             payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, tokens, value, columns.good
         )
         kind, first, last = tokens[..., 0], tokens[..., 1], tokens[..., 2]
-        for i in np.flatnonzero(~columns.good):
+        slow = ~columns.good
+        if self._listed:
+            # the compiled walk steps over lists
+            slow |= (kind[:, self._elements] == ABSENT).any(axis=1)
+        parts: dict[int, list[tuple[Index, pl.Series]]] = {slot: [] for slot in self._text}
+        for i in np.flatnonzero(slow).tolist():
             payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
-            columns.good[i] = self._slow(payload, kind[i], value[i])
+            message = _message(payload)
+            columns.good[i] = message is not None
+            self._slow(message or {}, kind[i], value[i])
+            for slot, own in parts.items():
+                if isinstance(word := _at(message, self._paths[slot]), str):
+                    own.append((np.array([i]), pl.Series([word])))
         value[kind != NUMBER] = np.nan
         for slot in range(k):
             text = np.flatnonzero((kind[:, slot] == TEXT) & columns.good)
             if text.size:
                 # ascending, as stretches of one buffer are
-                value[text, slot] = number(Spans(payloads.buffer, first[text, slot], last[text, slot]).text())
+                words = Spans(payloads.buffer, first[text, slot], last[text, slot]).text()
+                value[text, slot] = number(words)
+                if slot in parts:
+                    parts[slot].append((text, words.rename("")))
+        for slot, own in parts.items():
+            if own:
+                columns.text[slot] = _in_order(own, np.isnan(value[:, slot]))
         columns.value[:] = value.T
         columns.present[:] = (kind != ABSENT).T & columns.good
         return columns
 
-    def _slow(self, payload: bytes, kind: NDArray[np.int64], value: NDArray[np.float64]) -> bool:
-        """Read one message by Python's own reader."""
-        kind[:] = ABSENT
-        try:
-            message = json.loads(payload)
-        except (ValueError, RecursionError):
-            return False
-        if not isinstance(message, dict):
-            return False
+    def _slow(self, message: dict[str, Any], kind: NDArray[np.int64], value: NDArray[np.float64]) -> None:
+        """Take what is wanted from one message that Python's own reader has read."""
         for slot, path in enumerate(self._paths):
-            kind[slot], value[slot] = _leaf(message, path)
-        return True
+            kind[slot], value[slot] = _leaf(_at(message, path))
 
 
-def _leaf(value: Any, path: list[str]) -> tuple[int, float]:
+def _in_order(parts: list[tuple[Index, pl.Series]], odd: NDArray[np.bool_]) -> tuple[Index, pl.Series]:
+    """Return numbers of messages and their text, ascending, of those that are odd."""
+    at, text = np.concatenate([at for at, _ in parts]), pl.concat([words for _, words in parts])
+    order = np.argsort(at)
+    order = order[odd[at[order]]]
+    return at[order], text.gather(order)
+
+
+def _message(payload: bytes) -> dict[str, Any] | None:
+    """Return a JSON object, None for anything else."""
+    message = _parsed(payload)
+    if message is None and payload.endswith(b"\0"):
+        # that ends a string in C; tried second, for UTF-16 may end so too
+        message = _parsed(payload.rstrip(b"\0"))
+    return message
+
+
+def _parsed(payload: bytes) -> dict[str, Any] | None:
+    try:
+        message = json.loads(payload)
+    except (ValueError, RecursionError):
+        return None
+    return message if isinstance(message, dict) else None
+
+
+def _is_index(part: str) -> bool:
+    """Return whether a part of a path may be the place of an element in a list."""
+    return part.isascii() and part.isdigit() and len(part) <= _LONGEST_INDEX
+
+
+def _at(value: Any, path: list[str]) -> Any:
+    """Return what stands at a path, None for nothing."""
     for part in path:
-        value = value.get(part) if isinstance(value, dict) else None
+        if isinstance(value, list) and _is_index(part):
+            value = value[int(part)] if int(part) < len(value) else None
+        else:
+            value = value.get(part) if isinstance(value, dict) else None
+    return value
+
+
+def _leaf(value: Any) -> tuple[int, float]:
+    """Return what a value is, and the number that it is."""
     if value is None:
         return ABSENT, np.nan
     if isinstance(value, bool) or not isinstance(value, int | float | str):

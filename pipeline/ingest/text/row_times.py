@@ -112,14 +112,7 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         written = f"^(?<date>{_date_pattern(column.date_form)})[T\\s]+(?<clock>.+)$"
         instant, good = _of_two(*_parted(cells[column.column], written), column, notes)
     elif column.unit is None:
-        text = cells[column.columns[0]]
-        instant, good, zoned = iso_instants(spans_of(text))
-        if bool(np.any(good & ~zoned)):
-            notes.append(_NO_ZONE)
-        # an hour of one digit, a blank before the zone, the basic form
-        odd = np.flatnonzero(stated & ~good)
-        if odd.size:
-            instant[odd], good[odd] = _of_two(*_parted(text.gather(odd), _TO_THE_SECOND), column, notes)
+        instant, good = text_instants(cells[column.columns[0]], column, notes)
     else:
         instant, good = decimal_times(cells[column.columns[0]], column.unit)
         good &= np.abs(instant) < _FARTHEST
@@ -133,6 +126,34 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
     note = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says"
     shown = f"; the column agrees within {_resolution_s(instant[good]):.4g} s." if np.ptp(instant[good]) else "."
     return RowTimes(_counted(row, column.interval_s) + first, every, every, [*notes, note + shown])
+
+
+def text_instants(text: pl.Series, column: TimeColumn, notes: list[str]) -> tuple[Nanoseconds, Flag]:
+    """Read times as ISO 8601 writes them, and near relatives of these.
+
+    Parameters
+    ----------
+    text : polars.Series of String, shape (m,)
+        Without blanks at either end; null is no time.
+    column : TimeColumn
+        Where it stands.
+    notes : list of str
+        A note is added where a time names no zone.
+
+    Returns
+    -------
+    time_utc_ns : ndarray of int64, shape (m,)
+        Zero where the text is no time.
+    good : ndarray of bool, shape (m,)
+    """
+    instant, good, zoned = iso_instants(spans_of(text))
+    if bool(np.any(good & ~zoned)) and _NO_ZONE not in notes:
+        notes.append(_NO_ZONE)
+    # an hour of one digit, a blank before the zone, the basic form
+    odd = np.flatnonzero(text.is_not_null().to_numpy() & ~good)
+    if odd.size:
+        instant[odd], good[odd] = _of_two(*_parted(text.gather(odd), _TO_THE_SECOND), column, notes)
+    return instant, good
 
 
 def _counted(row: Index, interval_s: float) -> Nanoseconds:
