@@ -88,6 +88,20 @@ VOID_WHERE_NEGATIVE: dict[str, tuple[tuple[str, str], ...]] = {
 }
 
 
+def in_ned(mapped: ChannelMap) -> ChannelMap:
+    """Return what an offered field is where the axes point north, east and down, or to bow, starboard and down.
+
+    Examples
+    --------
+    >>> in_ned(OFFERED["sensor_msgs/Imu"]["angular_velocity.z"]).positive
+    'starboard'
+    >>> in_ned(OFFERED["geometry_msgs/TwistStamped"]["twist.linear.x"]).channel
+    'velocity_north'
+    """
+    other = {"velocity_east": "velocity_north", "velocity_north": "velocity_east"}.get(mapped.channel, mapped.channel)
+    return ChannelMap(channel=other, unit=mapped.unit)
+
+
 def plain_name(schema: str) -> str:
     """Return the name of a message as it stands in the tables above.
 

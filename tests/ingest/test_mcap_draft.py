@@ -15,7 +15,7 @@ from kempf.pipeline.ingest.mcap.fields import fields_of
 from kempf.pipeline.ingest.mcap.joint_names import joint_names
 from tests.ingest.ros_definitions import DEFINITIONS, joined
 from tests.ingest.test_mcap import START, write
-from tests.ingest.test_mcap_messages import header
+from tests.ingest.test_mcap_messages import header, imu
 
 ARRAY = joined(
     "MultiArrayLayout layout\nfloat64[] data",
@@ -42,6 +42,16 @@ def drafted(data: bytes, name: str = "day.mcap") -> dict[str, str]:
 
 def array(*data: float) -> dict[str, object]:
     return {"layout": {"dim": [], "data_offset": 0}, "data": list(data)}
+
+
+@pytest.mark.parametrize(("frame", "turned"), [("imu_link", ("port", "port")), ("imu_ned", ("starboard",) * 2)])
+def test_axes_of_a_frame_that_points_down_are_not_turned(frame: str, turned: tuple[str, str]) -> None:
+    messages = [imu(k, header=header(k, frame)) for k in range(2)]
+    offered = fields_of(
+        "a.mcap", LogFile(ros("/imu", "sensor_msgs/msg/Imu", DEFINITIONS["sensor_msgs/msg/Imu"], messages))
+    )
+    sides = [offered["/imu"][field].positive for field in ("angular_velocity.z", "orientation.yaw")]
+    assert tuple(sides) == turned
 
 
 def test_the_elements_that_a_list_of_ros_has_are_offered() -> None:

@@ -18,7 +18,7 @@ from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
 from kempf.pipeline.ingest.mcap.topics import reader_of
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans, as_bytes
-from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
+from kempf.schemas.known_messages import OFFERED, TAKEN, in_ned, plain_name
 from kempf.schemas.profile import ChannelMap
 
 #: Stretches of the file in which a message of every topic is looked for, and how deep its fields may lie.
@@ -26,6 +26,9 @@ _MOST, _DEEPEST = 8, 8
 
 #: Messages of each channel that are looked at, for a first one may be empty.
 _MESSAGES = 16
+
+#: The end of a `frame_id` whose axes point north, east and down, in CDR and in JSON, and how far it may be to there.
+_NED, _HEADER = (b"_ned\0", b'_ned"'), 256
 
 #: Longest list whose elements are offered one by one; a longer one is a matrix, a scan or a picture.
 _LONGEST = 8
@@ -63,9 +66,13 @@ def fields_of(name: str, log: LogFile) -> dict[str, Fields]:
     for number, channel in stream.channels.items():
         schema = stream.schemas.get(channel.schema)
         kind = plain_name(schema.name) if schema else ""
-        known: dict[str, ChannelMap] = TAKEN.get(kind, {}) | OFFERED.get(kind, {})
+        messages = first.get(number, [b""])
+        offered = OFFERED.get(kind, {})
+        if any(end in message[:_HEADER] for message in messages for end in _NED):
+            offered = {field: in_ned(mapped) for field, mapped in offered.items()}
+        known: dict[str, ChannelMap] = TAKEN.get(kind, {}) | offered
         fields: Fields = dict(known)
-        for message in first.get(number, [b""]):
+        for message in messages:
             fields = fields | {k: None for k in numbers_of(channel, schema, message) if k not in fields}
             if kind == "sensor_msgs/JointState":
                 named = {str(k): name for k, name in enumerate(joint_names(message))}
