@@ -169,7 +169,7 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
     async def ask(request: Request) -> Response:
         form = await _form(request)
         asked = await run_in_threadpool(job.ask, desk, form)
-        return RedirectResponse(f"/jobs/{asked.id}", 303)
+        return RedirectResponse(job.place_of(asked), 303)
 
     async def again(request: Request) -> Response:
         asked = await run_in_threadpool(desk.queue.again, request.path_params["name"])

@@ -34,10 +34,20 @@ def asked(client: TestClient, kind: str, **fields: str) -> dict[str, Any]:
     return done(client, client.post("/jobs", data={"kind": kind, "vessel": "mariner", **fields}, headers=OURS))
 
 
+def form_of(page: str, button: str) -> str:
+    """The one form of a page that has a button."""
+    (form,) = [f for f in re.findall(r"<form.*?</form>", page, re.DOTALL) if f">{button}</button>" in f]
+    return form
+
+
 def hidden(page: str, button: str) -> dict[str, str]:
     """The fields of the form that a button of a page sends."""
-    form = next(f for f in re.findall(r"<form.*?</form>", page, re.DOTALL) if f">{button}</button>" in f)
+    form = form_of(page, button)
     found = {name: unescape(value) for name, value in re.findall(r'name="(\w+)" value="([^"]*)"', form)}
+    for name, options in re.findall(r'<select name="(\w+)">(.*?)</select>', form):
+        listed = re.findall(r'<option( value="([^"]*)")?( selected)?>([^<]*)<', options)
+        stated, value, _, words = next((one for one in listed if one[2]), listed[0])
+        found[name] = value if stated else words
     return {name: value for name, value in found.items() if name not in ("kind", "vessel")}
 
 
@@ -150,6 +160,36 @@ def test_a_note_is_text_whatever_is_in_it(working: Working, own: Path):
     assert client.post("/notes", data=note).status_code == 403
 
 
+@pytest.mark.parametrize(
+    ("place", "button", "choices"),
+    [
+        ("predict", "Predict it", {"manoeuvre": "zigzag", "angles": "10/10"}),
+        ("what-if", "Move it", {"parameter": "b2"}),
+        ("next-trial", "Find the next trial", {"parameter": "b2"}),
+    ],
+)
+def test_what_is_chosen_is_what_the_button_asks_for(
+    writing: TestClient, place: str, button: str, choices: dict[str, str]
+):
+    page = writing.get(f"/v/mariner/{place}").text
+    form = form_of(page, button)
+    assert ">Show<" not in page and form.count("<button") == 1 and 'method="post"' in form
+    assert all(re.search(f'<(select|input) name="{name}"', form) for name in choices)
+    kind = re.search(r'name="kind" value="(\w+)"', form)
+    assert kind is not None
+    fields = {"kind": kind[1], "vessel": "mariner", **hidden(page, button), **choices}
+    asked_for = writing.get(writing.post("/jobs", data=fields, headers=OURS).headers["location"] + ".json").json()
+    assert choices.items() <= asked_for["arguments"].items()
+    # where it is being made is said at the address of the choice
+    assert asked_for["id"] in writing.get(f"/v/mariner/{place}", params={**hidden(page, button), **choices}).text
+
+
+def test_one_who_may_only_read_looks_at_what_is_made(client: TestClient):
+    page = client.get("/v/mariner/predict").text
+    form = form_of(page, "Show")
+    assert 'method="get"' in form and 'action="/v/mariner/predict"' in form and "Predict it: open the address" in page
+
+
 def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, own: Path):
     client, _, _ = working
     place = "/v/mariner/predict?manoeuvre=zigzag&angles=20/20"
@@ -163,6 +203,9 @@ def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, o
         *("predict", "zigzag", "--angles", "20/20", "--vessel", "mariner", "--compare"), "--warehouse", own, "--json"
     ).json
     assert client.get(place.replace("predict?", "predict.json?")).json() == printed
+    # asked for once more it is there at once
+    once_more = {"kind": "sail", "vessel": "mariner", **hidden(page.text, "Predict it")}
+    assert client.post("/jobs", data=once_more, headers=OURS).headers["location"] == place
 
 
 def test_the_next_trial_is_the_one_that_the_command_proposes(working: Working, own: Path):

@@ -20,7 +20,7 @@ from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
-from kempf.workbench.web.jobs.queue import ACTIVE, Job
+from kempf.workbench.web.jobs.queue import ACTIVE, DONE, Job
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.window import instant
 
@@ -77,6 +77,12 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
     require_current(desk.warehouse, vessel, form.get("standing"))
     arguments, digest = settled(desk, kind, vessel, form)
     return desk.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
+
+
+def place_of(job: Job) -> str:
+    """Return where an answer is that is made already and that the job keeps; else the page of the job."""
+    made = job.result if job.state == DONE else {}
+    return str(made["to"]) if "to" in made and "document" in made else f"/jobs/{job.id}"
 
 
 def settled(desk: Desk, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
