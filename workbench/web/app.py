@@ -34,6 +34,7 @@ from kempf.workbench.web.pages import (
     fleet,
     ingest,
     job,
+    jobs,
     ladder,
     log,
     manoeuvre,
@@ -46,6 +47,7 @@ from kempf.workbench.web.pages import (
     vessel,
     what_if,
 )
+from kempf.workbench.web.pages import error as error_page
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.settings import Settings
 from kempf.workbench.web.templating import rendered
@@ -81,6 +83,7 @@ def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI
     app.middleware("http")(Guard(settings))
     static_files.serve(app)
     desk = Desk(warehouse, state)
+    app.state.queue = desk.queue
     _serve_pages(app, desk)
     _serve_jobs(app, desk)
     for kind in (KempfError, HTTPException, Exception):
@@ -190,6 +193,7 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
 
     app.add_route("/jobs/{name}.json", document)
     app.add_route("/jobs/{name}", shown)
+    app.add_route("/jobs", lambda r: _shown(r, jobs.gather(desk)))
     app.add_route("/jobs", ask, methods=["POST"])
     app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
     app.add_route("/jobs/{name}/again", again, methods=["POST"])
@@ -250,6 +254,7 @@ def _html(request: Request, page: Page) -> str:
         # on every sheet that is printed
         address=str(request.url.remove_query_params("token")),
         today=datetime.now(UTC).date().isoformat(),
+        at_work=len(request.app.state.queue.active()),
         **page.content,
     )
 
@@ -272,5 +277,4 @@ def _refused(request: Request, error: Exception) -> Response:
     status = _STATUS_OF_CODE.get(failure.code, _STATUS[failure.exit_code])
     if request.url.path.endswith((".json", "/series", "/predicted")):
         return Response(json_text(failure.to_json()) + "\n", status, media_type="application/json")
-    page = Page("error.html", "That did not work", {"error": failure, "status": status})
-    return HTMLResponse(_html(request, page), status)
+    return HTMLResponse(_html(request, error_page.gather(failure, status)), status)

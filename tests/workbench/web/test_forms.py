@@ -74,6 +74,7 @@ def test_what_is_no_log_or_nobodys_is_refused_in_words(working: Working, monkeyp
     pdf = {"log": ("report.pdf", b"%PDF-1.7\nno log")}
     failed = done(client, client.post("/ingest", data={"vessel": "mariner"}, files=pdf, headers=OURS))
     assert failed["error"]["code"] == "unknown_format" and "is a PDF document" in failed["page"]
+    assert ">done<" not in failed["page"] and 'href="/ingest">Send' in failed["page"]
     assert client.post(f"/jobs/{failed['id']}/again", headers=OURS).status_code == 303
     for data, files, status, code in (
         ({"vessel": "marinner"}, pdf, 404, "no_vessel"),
@@ -99,6 +100,9 @@ def test_a_correction_is_previewed_stored_and_taken_back(working: Working, own: 
     assert client.get("/v/mariner/segments.json").json() == before  # nothing is stored
     assert seen["result"]["planned"]["following"]["superseded"] and "<b>" not in seen["page"]
     stored = asked(client, "correct", **hidden(seen["page"], "Store it"))
+    # the page stays: what undoes it, and what follows, is nowhere else
+    assert stored["result"]["to"] == f"/jobs/{stored['id']}" and "are superseded" in stored["page"]
+    assert 'value="reprocess"' in form_of(stored["page"], "Identify her again")
     assert client.get(f"/segments/{name}.json").json()["excluded"] == fields["reason"]
     printed = kempf("segments", "corrections", "--vessel", "mariner", "--warehouse", own, "--json").json
     assert [one["action"] for one in printed] == ["exclude"]

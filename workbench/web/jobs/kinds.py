@@ -146,7 +146,7 @@ def correct(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     progress(0, 1, "looking through the log with the correction")
     planned = _planned(warehouse, arguments)
     planned.store(warehouse)
-    return {"to": f"/segments/{planned.after.segment_id}", "planned": planned.show()}
+    return {"planned": planned.show()}  # its own page says what can be done next
 
 
 def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:

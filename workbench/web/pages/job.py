@@ -20,7 +20,7 @@ from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
-from kempf.workbench.web.jobs.queue import ACTIVE, DONE, Job
+from kempf.workbench.web.jobs.queue import ACTIVE, DONE, FAILED, QUEUED, Job
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.window import instant
 
@@ -48,6 +48,8 @@ def gather(desk: Desk, name: str) -> Page:
     ticks = desk.queue.ticks(name)
     # one piece of work ticks many times
     pieces = [piece for piece, _ in groupby(tick.what for tick in ticks)]
+    if job.state == FAILED and pieces[-1:] == ["done"]:  # with every file looked at, none of which went in
+        pieces.pop()
     iterations = [(tick.what, tick.figures) for tick in ticks if tick.figures is not None]
     shown = iterations[-_MOST:]
     figures = [iteration for _, iteration in shown]
@@ -55,8 +57,12 @@ def gather(desk: Desk, name: str) -> Page:
         **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
         **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
     }
+    waiting = [one.id for one in desk.queue.active()]
+    content["before"] = waiting.index(job.id) if job.state == QUEUED and job.id in waiting else 0
     vessel = job.arguments["vessel"]
-    return Page("job.html", f"{KINDS[job.kind].title}: {vessel}", content, ((vessel, of_vessel(vessel)),))
+    return Page(
+        "job.html", f"{KINDS[job.kind].title}: {vessel}", content, (("Jobs", "/jobs"), (vessel, of_vessel(vessel)))
+    )
 
 
 def ask(desk: Desk, form: Mapping[str, str]) -> Job:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.workbench.manoeuvre_figures import FIGURES, in_words
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.sailed import MANOEUVRES
@@ -30,6 +31,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     reply = answer(desk, "sail", vessel, fields)
     content: dict[str, Any] = {
         "vessel": vessel,
+        "stale": said_of_vessel(desk.warehouse, vessel),
         "asked": reply.arguments,
         "manoeuvres": MANOEUVRES,
         "made": reply.document,
