@@ -212,6 +212,46 @@ def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, o
     assert client.post("/jobs", data=once_more, headers=OURS).headers["location"] == place
 
 
+def test_what_limits_a_prediction_is_above_its_figures_and_measured_circles_are_named(
+    writing: TestClient, tmp_path: Path
+):
+    page = writing.get("/v/mariner/predict").text
+    fields = {"kind": "sail", "vessel": "mariner", **hidden(page, "Predict it")}
+    writing.post("/jobs", data=fields, headers=OURS)
+    queue = Queue(tmp_path / "state" / "jobs.sqlite")
+    (job,) = queue.active()
+    queue.take()
+    figure = {"value": 1.193, "low": 1.1, "high": 1.3}
+    beside = {"figure": "steady_yaw_rate_deg_s", "measured": 1.64, "measured_low": None, "measured_high": None}
+    measured = {
+        "segment_id": "seg-1",
+        "side": "port",
+        "sample": "held_out",
+        "why": "",
+        "figures": [{**beside, **figure}],
+    }
+    measured["figures"][0]["inside"] = True
+    why = "extrapolated in drift angle and rudder"
+    advance = {"name": "advance", "limit": 724.2, "unit": "m", "probability": 0.84, "why": why}
+    document = {
+        "manoeuvre": {"kind": "turning-circle", "rudder_deg": 35.0, "side": "starboard"},
+        "figures": {"steady_yaw_rate_deg_s": figure},
+        "imo": [advance],
+        "extrapolated": [{"sentence": "rudder up to 35 deg, the logs cover 20 deg"}],
+        "limits": ["42 of 256 ships that the errors allow do not sail it"],
+        "measured": [measured],
+        "assumed": [],
+    }
+    curve = [[float(k), 0.0, 0.1, 0.0, 5.0, 10.0 * k, float(k)] for k in range(3)]
+    queue.finish(job.id, {"to": "/", "document": document, "curves": {"estimates": [curve], "ships": []}})
+    page = writing.get("/v/mariner/predict").text
+    places = [page.index(words) for words in ("Extrapolated: rudder", "42 of 256", "<h2>Figures", "<h2>IMO", why)]
+    assert places == sorted(places) and "probability of 84 %" in page
+    table = page[page.index("<h2>Measured") :]
+    assert "yaw rate in the last turn" in table and "steady yaw rate" not in table
+    assert "while her speed still falls" in table and "steady yaw rate" in page
+
+
 def test_the_next_trial_is_the_one_that_the_command_proposes(working: Working, own: Path):
     client, _, _ = working
     page = client.get("/v/mariner/next-trial?parameter=b2").text
