@@ -14,7 +14,7 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound, UsageError
@@ -22,6 +22,7 @@ from kempf.warehouse.store import Warehouse
 from kempf.workbench.documents.text import json_text
 from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import address_of, vessel_at
+from kempf.workbench.web.data import reports
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.guard import Guard
 from kempf.workbench.web.numbers import whole_number
@@ -191,7 +192,13 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         asked = await run_in_threadpool(desk.queue.cancel, request.path_params["name"])
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
+    def report(request: Request) -> Response:
+        asked = desk.queue.get(request.path_params["name"])
+        # never shown among the pages: its script is its own
+        return FileResponse(reports.of_job(desk.state, asked), filename=asked.result["file_name"])
+
     app.add_route("/jobs/{name}.json", document)
+    app.add_route("/jobs/{name}/report", report)
     app.add_route("/jobs/{name}", shown)
     app.add_route("/jobs", lambda r: _shown(r, jobs.gather(desk)))
     app.add_route("/jobs", ask, methods=["POST"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from shutil import copytree
@@ -12,9 +13,12 @@ from starlette.testclient import TestClient
 
 from kempf.flows.jobs import standing_model
 from kempf.flows.jobs.correct_segments import plan_for
+from kempf.flows.process.progress import silent
 from kempf.warehouse import aliases, segments
 from kempf.warehouse.store import Warehouse
-from tests.late import VESSEL
+from kempf.workbench.web.jobs.kinds import KINDS
+from kempf.workbench.web.jobs.queue import Queue
+from tests.late import VESSEL, some_effects
 from tests.workbench.driving import kempf
 from tests.workbench.web.conftest import OURS, TOKEN, client_of
 from tests.workbench.web.test_forms import form_of
@@ -106,3 +110,30 @@ def test_a_ship_without_a_model_of_several_manoeuvres_is_offered_one(filled: Pat
         assert "/v/mariner/ladder" not in one.get("/v/mariner").text
         answer = one.get("/v/mariner/ladder")
     assert answer.status_code == 404 and 'value="diagnose"' in form_of(answer.text, "Diagnose")
+
+
+def test_the_report_is_downloaded_as_the_command_writes_it(late_diagnosed: Path, tmp_path: Path):
+    place, state = copytree(late_diagnosed / "w", tmp_path / "w"), tmp_path / "state"
+    found = json.loads((late_diagnosed / "diagnosed.json").read_text())["diagnosis_id"]
+    with client_of(place, state) as client:
+        client.get(f"/?token={TOKEN}")
+        form = form_of(client.get(f"/diagnoses/{found}").text, "Write the report")
+        assert 'value="report"' in form_of(client.get(PAGE).text, "Write the report")
+        fields = dict(re.findall(r'name="(\w+)" value="([^"]*)"', form))
+        job = client.post("/jobs", data=fields, headers=OURS).headers["location"]
+        assert client.get(job + "/report").status_code == 404
+        queue, (asked,) = Queue(state / "jobs.sqlite"), Queue(state / "jobs.sqlite").active()
+        queue.take()
+        with some_effects():
+            queue.finish(asked.id, KINDS["report"].work(Warehouse(str(place)), state, asked.arguments, silent))
+            written = kempf("report", "--vessel", VESSEL, "--warehouse", place, "--output", tmp_path / "it.html")
+        assert written.code == 0, written
+        page = client.get(job).text
+        assert f'href="{job}/report"' in page and f"/diagnoses/{found}" in page
+        file = client.get(job + "/report")
+        assert file.headers["content-disposition"] == f'attachment; filename="{VESSEL}.html"'
+        assert file.content == (tmp_path / "it.html").read_bytes()
+        next((state / "reports").iterdir()).unlink()
+        assert "no_report" in client.get(job + "/report").text
+        # asked for once more it is made anew
+        assert client.post("/jobs", data=fields, headers=OURS).headers["location"] == job and queue.active()

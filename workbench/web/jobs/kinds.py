@@ -86,6 +86,25 @@ def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pr
     return {"to": f"/diagnoses/{diagnosis.diagnosis_id}"}
 
 
+def report(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Write the report of a diagnosis, made first where it is not stored; the file is that of `kempf report`."""
+    from kempf.workbench.chosen_model import chosen_model
+    from kempf.workbench.report.build import make_report
+    from kempf.workbench.report.file_name import called_after
+    from kempf.workbench.web.data.reports import keep
+
+    vessel = arguments["vessel"]
+    spec, own = chosen_model(warehouse, vessel, arguments["set"] or None, None)
+    made = make_report(warehouse, vessel, spec, own, progress)
+    return {
+        "report": keep(state, made.html),
+        "file_name": called_after(vessel),
+        "bytes": len(made.html.encode()),
+        "diagnosis_id": made.diagnosis_id,
+        "headline": made.content.wording.headline,
+    }
+
+
 def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Add an effect to a vessel's current model."""
     from kempf.flows.jobs.add_effect import add_effect
@@ -250,6 +269,7 @@ KINDS: Mapping[str, Kind] = {
     "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),
     "changes": Kind(examine, "Look for changes", ("as_of",)),
     "diagnose": Kind(diagnose, "Diagnose", ()),
+    "report": Kind(report, "Write the report", ("set",), changes=True),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),
     "add": Kind(add, "Add the effect", ("effect", "formula", "standing"), changes=True),
     "undo": Kind(undo, "Undo the last effect", ("standing",), changes=True),

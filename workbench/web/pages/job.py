@@ -120,6 +120,11 @@ def _name_the_set(desk: Desk, arguments: Arguments) -> None:
     arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], name)[0].parameter_set_id
 
 
+def _known_set(desk: Desk, arguments: Arguments) -> None:
+    if arguments["set"]:
+        _name_the_set(desk, arguments)
+
+
 def _formula(desk: Desk, arguments: Arguments) -> None:
     from kempf.flows.jobs.try_formula import formula_of_ones_own
 
@@ -166,6 +171,7 @@ _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "explain": _stretch,
     "what_if": _name_the_set,
     "next_trial": _name_the_set,
+    "report": _known_set,
     "sail": _sail,
     "changes": _then,
     "try": _formula,
