@@ -68,8 +68,8 @@ _STATUS_OF_CODE = {
     "upload_too_large": 413,
 }
 Fields = Mapping[str, str]
-#: bytes that a form may have
-_MOST_FORM = 16_384
+#: bytes that a form may have, and one with a profile
+_MOST_FORM, _MOST_PROFILE = 16_384, 262_144
 
 
 def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI:
@@ -184,6 +184,12 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         asked = await run_in_threadpool(ingest.ask, desk, received)
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
+    async def with_profile(request: Request) -> Response:
+        form = await _form(request, _MOST_PROFILE)
+        failed = await run_in_threadpool(desk.queue.get, request.path_params["name"])
+        asked = await run_in_threadpool(ingest.ask_with_profile, desk, failed, form.get("profile", ""))
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
     async def note(request: Request) -> Response:
         form = await _form(request)
         return RedirectResponse(await run_in_threadpool(notes.write, desk, form), 303)
@@ -204,18 +210,19 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
     app.add_route("/jobs", ask, methods=["POST"])
     app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
     app.add_route("/jobs/{name}/again", again, methods=["POST"])
+    app.add_route("/jobs/{name}/profile", with_profile, methods=["POST"])
     app.add_route("/ingest", lambda r: _shown(r, ingest.gather(desk)))
     app.add_route("/ingest", take_in, methods=["POST"])
     app.add_route("/notes", note, methods=["POST"])
 
 
-async def _form(request: Request) -> dict[str, str]:
+async def _form(request: Request, most: int = _MOST_FORM) -> dict[str, str]:
     """Return the fields of a form; of several of one name the last counts."""
     body = b""
     async for part in request.stream():
         body += part
-        if len(body) > _MOST_FORM:
-            raise UsageError("form_too_long", f"The form has more than {_MOST_FORM} bytes.", "Send less.")
+        if len(body) > most:
+            raise UsageError("form_too_long", f"The form has more than {most} bytes.", "Send less.")
     return dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
 
 

@@ -31,6 +31,7 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
         "/",
         "/ingest",
         "/compare",
+        "/jobs",
         f"/v/{VESSEL}",
         f"/v/{VESSEL}/changes",
         f"/logs/{log}",
@@ -52,6 +53,16 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
     accessible(tab)
     tab.click("text=The manoeuvre as it is now")
     tab.wait_for_selector(".warning:has-text('tugs alongside')")
+    accessible(tab)
+    # a log without a profile: its draft, to be corrected
+    tab.goto(server.base + "/ingest")
+    rows = "".join(f"2025-05-03T06:00:{second:02d}Z,{second},1\n" for second in range(60))
+    table = {"name": "day.csv", "mimeType": "text/csv", "buffer": f"utc,heading,rudder\n{rows}".encode()}
+    tab.set_input_files("[name=log]", table)
+    tab.fill("[name=vessel]", "sister")
+    tab.check("[name=new_vessel]")
+    tab.click("button:has-text('Take them in')")
+    tab.wait_for_selector("textarea")
     accessible(tab)
     assert [words for words in server.complaints if "404" not in words] == []
 

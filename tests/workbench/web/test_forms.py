@@ -69,6 +69,26 @@ def test_a_log_that_is_sent_is_the_log_that_is_ingested(working: Working, logs: 
     assert [row["file_name"] for row in listed] == ["<b>mariner.csv"] and listed[0]["records_kept"] > 0
 
 
+def test_a_log_that_does_not_describe_itself_comes_in_with_a_drafted_profile(working: Working, logs: Path):
+    client, _, _ = working
+    content = b"".join(gzip.decompress((logs / "mariner.csv.gz").read_bytes()).splitlines(keepends=True)[:-1])
+    sent = {"data": {"vessel": "sister", "new_vessel": "yes"}, "files": {"log": ("mariner.csv", content)}}
+    failed = done(client, client.post("/ingest", **sent, headers=OURS))
+    assert failed["error"]["code"] == "no_source_for_log"
+    text = re.search(r"<textarea[^>]*>(.*?)</textarea>", failed["page"], re.DOTALL)
+    assert text is not None and "Run it again" not in failed["page"]
+    draft = unescape(text[1])
+    assert 'vessel: "sister"' in draft and '{channel: "yaw_rate?"' in draft
+    place = f"/jobs/{failed['id']}/profile"
+    uncorrected = client.post(place, data={"profile": draft}, headers=OURS)
+    assert uncorrected.status_code == 400 and "?" in uncorrected.text
+    assert client.post(place, data={"profile": draft}).status_code == 403
+    corrected = draft.replace("?", "")
+    new = done(client, client.post(place, data={"profile": corrected}, headers=OURS))
+    assert [one["outcome"] for one in new["result"]["outcomes"]] == ["new"], new
+    assert [row["file_name"] for row in client.get("/v/sister/logs.json").json()] == ["mariner.csv"]
+
+
 def test_what_is_no_log_or_nobodys_is_refused_in_words(working: Working, monkeypatch: pytest.MonkeyPatch):
     client, _, _ = working
     pdf = {"log": ("report.pdf", b"%PDF-1.7\nno log")}

@@ -6,6 +6,7 @@ Each takes the warehouse, the folder of what is kept, its arguments and a `Progr
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -150,8 +151,19 @@ def ingest(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], prog
     outcomes = take_in(warehouse, paths, arguments["vessel"], profiles, progress, new_vessel=new)
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(failed) == len(outcomes):
-        raise failed[0]
+        raise _with_draft(failed[0], paths[0], arguments["vessel"])
     return {"outcomes": [{**outcome.show(), "path": Path(outcome.path).name} for outcome in outcomes]}
+
+
+def _with_draft(error: KempfError, log: Path, vessel: str) -> KempfError:
+    """Return the error of a log that needs a profile with the draft of one, for a person to correct."""
+    if error.code == "no_source_for_log":
+        from kempf.flows.jobs.draft_profile import draft
+
+        with suppress(KempfError):
+            # a JSON text is a YAML one
+            error.details["draft"] = draft(log).replace('vessel: "?"', f"vessel: {json.dumps(vessel)}", 1)
+    return error
 
 
 def preview(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
