@@ -277,6 +277,13 @@ def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str,
     return [(loads(text), estimator, loads(settings).get("own") or {}) for text, estimator, settings in frame.rows()]
 
 
+def specifications(warehouse: Warehouse, names: Collection[str]) -> dict[str, dict[str, Any]]:
+    """Return the model specification of some sets of any vessels by their whole ids; one that is lost is left out."""
+    columns = ("parameter_set_id", "model_json")
+    frame = delta.read(warehouse, "parameter_sets", {"parameter_set_id": sorted(names)}, columns)
+    return {name: loads(text) for name, text in frame.rows()}
+
+
 @dataclass(frozen=True)
 class Convergence:
     """How the search for a set ended, without what it found."""

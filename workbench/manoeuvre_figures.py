@@ -33,6 +33,20 @@ FIGURES = {
 }
 
 
+#: Of a measured circle the steady figures are means over its last turn, and so are those predicted beside it.
+_OF_LAST_TURN = {
+    "steady_diameter_m": "diameter of the last turn",
+    "steady_yaw_rate_deg_s": "yaw rate in the last turn",
+    "steady_drift_deg": "drift angle in the last turn",
+    "speed_loss_percent": "speed loss in the last turn",
+}
+#: Said below measured circles.
+LAST_TURN = (
+    "a circle is predicted for as long as it was sailed: while her speed still falls, what is said of the last turn is "
+    "not the steady figure of the prediction above"
+)
+
+
 def scaled(name: str, figure: Mapping[str, float | None], model_scale: float) -> dict[str, float | None]:
     """Return value and interval of a model's figure at full scale, by Froude's law.
 
@@ -73,3 +87,15 @@ def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
         # no minus before a nought
         return f"{words} {round(manoeuvre['orders_deg'][place], 1) + 0.0:g} deg"
     return f"{words} {place + 1}"
+
+
+def beside_in_words(kind: str, name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
+    """Return what a figure is called beside a measured manoeuvre of a kind, such as ``turning-circle``.
+
+    Examples
+    --------
+    >>> beside_in_words("turning-circle", "steady_yaw_rate_deg_s", None, {})
+    'yaw rate in the last turn'
+    """
+    words = in_words(name, place, manoeuvre)
+    return _OF_LAST_TURN.get(name, words) if kind == "turning-circle" else words

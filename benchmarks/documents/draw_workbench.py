@@ -89,7 +89,7 @@ def asked(page: Opened, address: str, name: str, height: int) -> None:
     """Open a page whose answer has to be made, let it be made, and take its picture."""
     tab = page.tab
     tab.goto(address)
-    made = tab.locator("main form.job button")
+    made = tab.locator("main form[action='/jobs'] button")
     if made.count():
         made.first.click()
         tab.wait_for_url("**/jobs/**")

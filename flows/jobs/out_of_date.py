@@ -9,7 +9,7 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from kempf.warehouse import corrections, examinations, logs, parameter_sets, vessels
+from kempf.warehouse import aliases, corrections, examinations, history, logs, parameter_sets, vessels
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.parameter_set import ParameterSet
@@ -58,7 +58,9 @@ def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:
 
 
 def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
-    """Return the sentence that a vessel's logs, or all of her parameter sets, are out of date; None where neither is.
+    """Return the sentence that a vessel's logs or parameter sets are out of date; None where neither are.
+
+    Sets are where other code made all of them, where her current one is superseded, and where it was withdrawn.
 
     Raises
     ------
@@ -69,7 +71,18 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     codes = parameter_sets.codes(warehouse, vessel)
     old = bool(codes) and code_of(warehouse, "estimate") not in codes
     parts = [f"{_logs(stale)} read"] * bool(stale) + ["parameter sets made"] * old
-    return f"{vessel}: {' and '.join(parts)} {_OLDER}; next: {command_for([vessel])}" if parts else None
+    said = [f"{' and '.join(parts)} {_OLDER}"] if parts else []
+    pointed = aliases.of_vessel(warehouse, vessel)
+    current, withdrawn = pointed.get(aliases.CURRENT), pointed.get(aliases.WITHDRAWN)
+    if current is None and withdrawn is not None:
+        said.append(f"no parameter set is current, since what {withdrawn} rests on was corrected or removed")
+    # of other code every set is superseded, which is said already
+    elif current is not None and not old and current not in history.standing(warehouse, vessel):
+        said.append(
+            f"the current parameter set {current} is superseded: her logs, her manoeuvres or the code have changed "
+            "since it was made"
+        )
+    return f"{vessel}: {'; '.join(said)}; next: {command_for([vessel])}" if said else None
 
 
 def said_of_sets(warehouse: Warehouse, sets: Iterable[ParameterSet]) -> str | None:

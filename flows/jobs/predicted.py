@@ -149,7 +149,8 @@ def limits_of(prediction: Prediction, parameter_set: ParameterSet) -> tuple[str,
     if prediction.no_ships:
         count = prediction.no_ships + len(prediction.drawn)
         sentences.append(
-            f"{prediction.no_ships} of {count} ships that the errors allow do not sail it and are in no interval"
+            f"{prediction.no_ships} of {count} ships that the errors allow do not sail it: they are in no interval"
+            f"{' and fulfil no criterion' if prediction.imo else ''}"
         )
     for model in prediction.run_away:
         sentences.append(

@@ -174,6 +174,14 @@ def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     return _model_at(warehouse, vessel, current_id(warehouse, vessel))
 
 
+def current_effects(warehouse: Warehouse, only: str | None = None) -> dict[str, tuple[str, ...]]:
+    """Return the effects in the current set of every vessel that has one, or of one vessel, in order."""
+    held = aliases.holders(warehouse, aliases.CURRENT)
+    chosen = {vessel: name for vessel, name in held.items() if only in (None, vessel)}
+    models = parameter_sets.specifications(warehouse, list(chosen.values()))
+    return {vessel: tuple(models.get(name, {}).get("effects") or ()) for vessel, name in chosen.items()}
+
+
 def standing_or_withdrawn(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model or, where it was withdrawn and none came after it, that one; else None."""
     pointed = aliases.of_vessel(warehouse, vessel)

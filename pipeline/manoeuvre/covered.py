@@ -30,6 +30,11 @@ class Beyond:
     unit: str
 
     @property
+    def words(self) -> str:
+        """The quantity in words."""
+        return {"drift": "drift angle", "yaw_rate": "yaw rate"}.get(self.quantity, self.quantity)
+
+    @property
     def sentence(self) -> str:
         """Say it."""
         if self.quantity == "speed":

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import radians
 
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.covered import Beyond
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.segment.imo import overshoot_limits
 from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
+from kempf.schemas.enumeration import listed
 
 #: in ship lengths: 5.3.1 and 5.3.2
 ADVANCE, TACTICAL_DIAMETER, INITIAL_TURNING = 4.5, 5.0, 2.5
@@ -36,18 +38,27 @@ class Judged:
 
 
 def judge(
-    manoeuvre: Manoeuvre, samples: Mapping[str, Float], vessel: Particulars, speed_m_s: float
+    manoeuvre: Manoeuvre,
+    samples: Mapping[str, Float],
+    drawn: int,
+    vessel: Particulars,
+    speed_m_s: float,
+    extrapolated: Sequence[Beyond] = (),
 ) -> tuple[Judged, ...]:
     """Judge a manoeuvre by the criteria that apply to it.
 
     Parameters
     ----------
     samples : mapping of str to ndarray, shape (n,)
-        Figures of all ships drawn; NaN where one has none, which fulfils nothing.
+        Figures of the ships that sail it; NaN where one has none, which fulfils nothing.
+    drawn : int
+        How many ships were drawn, n or more: one that does not sail it fulfils nothing either.
     vessel : Particulars
         Of her profile; a model is judged as the ship that it is one of.
     speed_m_s : float
         Of the approach; the standard asks for nine tenths of the trial speed at least.
+    extrapolated : sequence of Beyond, optional
+        In what the manoeuvre goes beyond the logs, which is said beside the verdict.
     """
     criteria = _criteria(manoeuvre, vessel, speed_m_s)
     short, full, slow = vessel.too_short, _at_full_scale(vessel, speed_m_s), ""
@@ -56,14 +67,15 @@ def judge(
             f"at {speed_m_s:.3g} m/s, below {100 * SLOWEST_SHARE:.0f} % of the trial speed "
             f"{vessel.trial_speed_m_s:g} m/s, which the standard asks for"
         )
+    outside = f"extrapolated in {listed([one.words for one in extrapolated])}" if extrapolated else ""
     unknown = "the length of the ship is not known: give it in the profile"
     return tuple(
         Judged(
             name,
             limit,
             unit,
-            float(np.mean(samples[figure] <= limit)),
-            "; ".join(filter(None, (full, note, short, slow))),
+            float(np.count_nonzero(samples[figure] <= limit) / drawn),
+            "; ".join(filter(None, (outside, full, note, short, slow))),
         )
         if limit is not None
         else Judged(name, None, unit, None, short or unknown)

@@ -124,14 +124,14 @@ def predict(
     if first is None or not every[0].sails:
         raise _no_ship(every[0], manoeuvre, logs, count)
     sailing = tuple(model for model in every if model.sails)
-    samples = _samples(sailing)
-    speed = models[0].waters.approach_m_s
+    samples, drawn = _samples(sailing), sum(len(model.drawn) + model.no_ships for model in sailing)
+    speed, extrapolated = models[0].waters.approach_m_s, beyond(first.reach, logs)
     return Prediction(
         manoeuvre,
         figures_of(first, sailing),
         sailing,
-        beyond(first.reach, logs),
-        judge(manoeuvre, samples, vessel, speed),
+        extrapolated,
+        judge(manoeuvre, samples, drawn, vessel, speed, extrapolated),
         tuple(model.model for model in every if not model.sails),
     )
 

@@ -114,6 +114,12 @@ def test_draws_that_are_no_ships_are_counted() -> None:
     loose = Identified(**{**vars(model), "covariance": covariance})
     found = made(loose, length=None)
     assert 0 < found.no_ships < 0.2 * 64
+    # by the criteria they fulfil nothing, and what is extrapolated says so beside the verdict
+    long = {one.name: one for one in made(loose, length=10_000.0).imo}["advance"]
+    assert long.probability == (64 - found.no_ships) / 64
+    assert "extrapolated in " in long.why
+    within = predict([identified(ship_of(HULLS["mariner"]))], CIRCLE, Reach(9, 9, 9, 0.1, 99), Particulars(160.93), 64)
+    assert within.extrapolated == () and "extrapolated" not in within.imo[0].why
     assert found.share_unstable == 1.0
 
 

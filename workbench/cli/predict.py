@@ -12,7 +12,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
-from kempf.workbench.manoeuvre_figures import FIGURES, in_words, scaled
+from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words, scaled
 from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
@@ -97,7 +97,7 @@ def command(
     else:
         _print_predicted(predicted, figure)
         if measured is not None:
-            _print_measured(measured)
+            _print_measured(measured, manoeuvre)
         if others:
             by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
             print_paragraph(f"not compared, as they are of other angles: {by_option}")
@@ -193,7 +193,7 @@ def _print_models(predicted: Predicted) -> None:
     print_table([f"{words} of the model", "value", "95 % interval", "unit"], rows)
 
 
-def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
+def _print_measured(measured: Sequence[MeasuredManoeuvre], kind: str) -> None:
     from kempf.flows.jobs.one_sided import one_sided
     from kempf.workbench.documents.prediction import judged, sentence_of
 
@@ -205,7 +205,7 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         for beside in run.figures:
             figure = beside.predicted
             base, _, place = beside.name.partition(".")
-            words = in_words(base, int(place) if place else None, vars(run))
+            words = beside_in_words(kind, base, int(place) if place else None, vars(run))
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
                 about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)
@@ -213,7 +213,7 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
                 rows.append([*about, _with_half(beside), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
     print_table(head, rows, "measured, and predicted as each was sailed: its own beginning, rudder, headings and wind")
-    for sentence in judged(measured):
+    for sentence in (*judged(measured), *([LAST_TURN] if kind == "turning-circle" else [])):
         print_paragraph(sentence)
     for found in one_sided(measured):
         print_paragraph(sentence_of(found))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 
 import click
@@ -37,8 +36,9 @@ def command(
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
     from kempf.workbench.new_file import require_new, write_new
     from kempf.workbench.report.build import make_report
+    from kempf.workbench.report.file_name import called_after
 
-    path = _called_after(vessel) if output is None else output
+    path = Path(called_after(vessel)) if output is None else output
     require_new(path, "--output")
     warehouse = Warehouse(uri)
     mine = Own(files=read_effect_files(files))
@@ -60,20 +60,3 @@ def command(
         return
     click.echo(f"{vessel}: {report.content.wording.headline}")
     click.echo(f"{path}: {len(report.html) / 1e6:.1f} MB, one file, to be opened in any browser", err=True)
-
-
-#: Letters of a vessel's name that stand in a file's name as they are.
-_PLAIN = re.compile(r"[^\w .-]")
-
-
-def _called_after(vessel: str) -> Path:
-    r"""Return a file name here that is made of a vessel's name, whatever she is called.
-
-    Examples
-    --------
-    >>> str(_called_after("Aurora 2")), str(_called_after("../a\0b"))
-    ('Aurora 2.html', '_.._a_b.html')
-    """
-    plain = _PLAIN.sub("_", vessel)[:80]
-    # neither hidden nor an option to other programs
-    return Path(("_" if plain.startswith((".", "-")) else "") + f"{plain}.html")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.standing_model import rungs_to, standing
+from kempf.flows.jobs.standing_model import current_id, rungs_to, standing
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.store import Warehouse
@@ -28,6 +28,6 @@ def ladder_document(warehouse: Warehouse, vessel: str) -> list[dict[str, Any]]:
             "no_model",
             f"{vessel!r} has no current model of several manoeuvres yet.",
             f"Run `kempf identify --vessel {vessel}`, or `kempf diagnose --vessel {vessel}`.",
-            {"vessel": vessel},
+            {"vessel": vessel, "current": current_id(warehouse, vessel)},
         )
     return rungs_to(warehouse, model)

@@ -14,7 +14,7 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import HTMLResponse, RedirectResponse, Response
+from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Response
 
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound, UsageError
@@ -22,6 +22,7 @@ from kempf.warehouse.store import Warehouse
 from kempf.workbench.documents.text import json_text
 from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import address_of, vessel_at
+from kempf.workbench.web.data import reports
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.guard import Guard
 from kempf.workbench.web.numbers import whole_number
@@ -34,6 +35,7 @@ from kempf.workbench.web.pages import (
     fleet,
     ingest,
     job,
+    jobs,
     ladder,
     log,
     manoeuvre,
@@ -46,6 +48,7 @@ from kempf.workbench.web.pages import (
     vessel,
     what_if,
 )
+from kempf.workbench.web.pages import error as error_page
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.settings import Settings
 from kempf.workbench.web.templating import rendered
@@ -65,8 +68,8 @@ _STATUS_OF_CODE = {
     "upload_too_large": 413,
 }
 Fields = Mapping[str, str]
-#: bytes that a form may have
-_MOST_FORM = 16_384
+#: bytes that a form may have, and one with a profile
+_MOST_FORM, _MOST_PROFILE = 16_384, 262_144
 
 
 def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI:
@@ -81,6 +84,7 @@ def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI
     app.middleware("http")(Guard(settings))
     static_files.serve(app)
     desk = Desk(warehouse, state)
+    app.state.queue = desk.queue
     _serve_pages(app, desk)
     _serve_jobs(app, desk)
     for kind in (KempfError, HTTPException, Exception):
@@ -169,7 +173,7 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
     async def ask(request: Request) -> Response:
         form = await _form(request)
         asked = await run_in_threadpool(job.ask, desk, form)
-        return RedirectResponse(f"/jobs/{asked.id}", 303)
+        return RedirectResponse(job.place_of(asked), 303)
 
     async def again(request: Request) -> Response:
         asked = await run_in_threadpool(desk.queue.again, request.path_params["name"])
@@ -180,6 +184,12 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         asked = await run_in_threadpool(ingest.ask, desk, received)
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
+    async def with_profile(request: Request) -> Response:
+        form = await _form(request, _MOST_PROFILE)
+        failed = await run_in_threadpool(desk.queue.get, request.path_params["name"])
+        asked = await run_in_threadpool(ingest.ask_with_profile, desk, failed, form.get("profile", ""))
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
     async def note(request: Request) -> Response:
         form = await _form(request)
         return RedirectResponse(await run_in_threadpool(notes.write, desk, form), 303)
@@ -188,23 +198,31 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         asked = await run_in_threadpool(desk.queue.cancel, request.path_params["name"])
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
+    def report(request: Request) -> Response:
+        asked = desk.queue.get(request.path_params["name"])
+        # never shown among the pages: its script is its own
+        return FileResponse(reports.of_job(desk.state, asked), filename=asked.result["file_name"])
+
     app.add_route("/jobs/{name}.json", document)
+    app.add_route("/jobs/{name}/report", report)
     app.add_route("/jobs/{name}", shown)
+    app.add_route("/jobs", lambda r: _shown(r, jobs.gather(desk)))
     app.add_route("/jobs", ask, methods=["POST"])
     app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
     app.add_route("/jobs/{name}/again", again, methods=["POST"])
+    app.add_route("/jobs/{name}/profile", with_profile, methods=["POST"])
     app.add_route("/ingest", lambda r: _shown(r, ingest.gather(desk)))
     app.add_route("/ingest", take_in, methods=["POST"])
     app.add_route("/notes", note, methods=["POST"])
 
 
-async def _form(request: Request) -> dict[str, str]:
+async def _form(request: Request, most: int = _MOST_FORM) -> dict[str, str]:
     """Return the fields of a form; of several of one name the last counts."""
     body = b""
     async for part in request.stream():
         body += part
-        if len(body) > _MOST_FORM:
-            raise UsageError("form_too_long", f"The form has more than {_MOST_FORM} bytes.", "Send less.")
+        if len(body) > most:
+            raise UsageError("form_too_long", f"The form has more than {most} bytes.", "Send less.")
     return dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
 
 
@@ -250,6 +268,7 @@ def _html(request: Request, page: Page) -> str:
         # on every sheet that is printed
         address=str(request.url.remove_query_params("token")),
         today=datetime.now(UTC).date().isoformat(),
+        at_work=len(request.app.state.queue.active()),
         **page.content,
     )
 
@@ -272,5 +291,4 @@ def _refused(request: Request, error: Exception) -> Response:
     status = _STATUS_OF_CODE.get(failure.code, _STATUS[failure.exit_code])
     if request.url.path.endswith((".json", "/series", "/predicted")):
         return Response(json_text(failure.to_json()) + "\n", status, media_type="application/json")
-    page = Page("error.html", "That did not work", {"error": failure, "status": status})
-    return HTMLResponse(_html(request, page), status)
+    return HTMLResponse(_html(request, error_page.gather(failure, status)), status)

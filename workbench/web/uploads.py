@@ -98,6 +98,15 @@ class Uploads:
             shutil.copyfileobj(file.file, target, _BLOCK)
         return f"{to.parent.name}/{to.name}"
 
+    def store_text(self, text: str, name: str) -> str:
+        """Keep a text that was written on a page as a file, and return its name as of one that was sent."""
+        data = text.encode()
+        to = self.folder / hashlib.sha256(data).hexdigest() / name
+        with whole_file(to) as passing:
+            passing.write_bytes(data)
+        self._forget_the_oldest()
+        return f"{to.parent.name}/{to.name}"
+
     def _forget_the_oldest(self) -> None:
         held = sorted(self.folder.glob("*"), key=lambda folder: (folder.stat().st_mtime_ns, folder.name))
         for folder in held[:-_MOST_KEPT]:

@@ -31,6 +31,7 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
         "/",
         "/ingest",
         "/compare",
+        "/jobs",
         f"/v/{VESSEL}",
         f"/v/{VESSEL}/changes",
         f"/logs/{log}",
@@ -48,7 +49,20 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
     tab.fill("[name=reason]", "tugs alongside")
     tab.click("button:has-text('Preview')")
     tab.click("button:has-text('Store it')")
+    tab.wait_for_selector("text=Stored.")  # and the page stays, with what can be done next
+    accessible(tab)
+    tab.click("text=The manoeuvre as it is now")
     tab.wait_for_selector(".warning:has-text('tugs alongside')")
+    accessible(tab)
+    # a log without a profile: its draft, to be corrected
+    tab.goto(server.base + "/ingest")
+    rows = "".join(f"2025-05-03T06:00:{second:02d}Z,{second},1\n" for second in range(60))
+    table = {"name": "day.csv", "mimeType": "text/csv", "buffer": f"utc,heading,rudder\n{rows}".encode()}
+    tab.set_input_files("[name=log]", table)
+    tab.fill("[name=vessel]", "sister")
+    tab.check("[name=new_vessel]")
+    tab.click("button:has-text('Take them in')")
+    tab.wait_for_selector("textarea")
     accessible(tab)
     assert [words for words in server.complaints if "404" not in words] == []
 
@@ -81,7 +95,7 @@ def test_every_page_about_a_model_is_accessible_and_fits(browser: Any, with_lag:
     ):
         tab.goto(f"{with_lag.base}{vessel_page}/{place}?{fields}")
         accessible(tab)  # before anything is asked for
-        tab.locator("main form.job button").first.click()
+        tab.locator("main form.ask button").first.click()
         tab.wait_for_url("**/jobs/**")
         accessible(tab)
         tab.wait_for_url(re.compile(f"{vessel_page}/{place}[?]"))

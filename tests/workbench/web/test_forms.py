@@ -34,10 +34,20 @@ def asked(client: TestClient, kind: str, **fields: str) -> dict[str, Any]:
     return done(client, client.post("/jobs", data={"kind": kind, "vessel": "mariner", **fields}, headers=OURS))
 
 
+def form_of(page: str, button: str) -> str:
+    """The one form of a page that has a button."""
+    (form,) = [f for f in re.findall(r"<form.*?</form>", page, re.DOTALL) if f">{button}</button>" in f]
+    return form
+
+
 def hidden(page: str, button: str) -> dict[str, str]:
     """The fields of the form that a button of a page sends."""
-    form = next(f for f in re.findall(r"<form.*?</form>", page, re.DOTALL) if f">{button}</button>" in f)
+    form = form_of(page, button)
     found = {name: unescape(value) for name, value in re.findall(r'name="(\w+)" value="([^"]*)"', form)}
+    for name, options in re.findall(r'<select name="(\w+)">(.*?)</select>', form):
+        listed = re.findall(r'<option( value="([^"]*)")?( selected)?>([^<]*)<', options)
+        stated, value, _, words = next((one for one in listed if one[2]), listed[0])
+        found[name] = value if stated else words
     return {name: value for name, value in found.items() if name not in ("kind", "vessel")}
 
 
@@ -59,11 +69,32 @@ def test_a_log_that_is_sent_is_the_log_that_is_ingested(working: Working, logs: 
     assert [row["file_name"] for row in listed] == ["<b>mariner.csv"] and listed[0]["records_kept"] > 0
 
 
+def test_a_log_that_does_not_describe_itself_comes_in_with_a_drafted_profile(working: Working, logs: Path):
+    client, _, _ = working
+    content = b"".join(gzip.decompress((logs / "mariner.csv.gz").read_bytes()).splitlines(keepends=True)[:-1])
+    sent = {"data": {"vessel": "sister", "new_vessel": "yes"}, "files": {"log": ("mariner.csv", content)}}
+    failed = done(client, client.post("/ingest", **sent, headers=OURS))
+    assert failed["error"]["code"] == "no_source_for_log"
+    text = re.search(r"<textarea[^>]*>(.*?)</textarea>", failed["page"], re.DOTALL)
+    assert text is not None and "Run it again" not in failed["page"] and "kempf profile" not in failed["page"]
+    draft = unescape(text[1])
+    assert 'vessel: "sister"' in draft and '{channel: "yaw_rate?"' in draft
+    place = f"/jobs/{failed['id']}/profile"
+    uncorrected = client.post(place, data={"profile": draft}, headers=OURS)
+    assert uncorrected.status_code == 400 and "?" in uncorrected.text
+    assert client.post(place, data={"profile": draft}).status_code == 403
+    corrected = draft.replace("?", "")
+    new = done(client, client.post(place, data={"profile": corrected}, headers=OURS))
+    assert [one["outcome"] for one in new["result"]["outcomes"]] == ["new"], new
+    assert [row["file_name"] for row in client.get("/v/sister/logs.json").json()] == ["mariner.csv"]
+
+
 def test_what_is_no_log_or_nobodys_is_refused_in_words(working: Working, monkeypatch: pytest.MonkeyPatch):
     client, _, _ = working
     pdf = {"log": ("report.pdf", b"%PDF-1.7\nno log")}
     failed = done(client, client.post("/ingest", data={"vessel": "mariner"}, files=pdf, headers=OURS))
     assert failed["error"]["code"] == "unknown_format" and "is a PDF document" in failed["page"]
+    assert ">done<" not in failed["page"] and 'href="/ingest">Send' in failed["page"]
     assert client.post(f"/jobs/{failed['id']}/again", headers=OURS).status_code == 303
     for data, files, status, code in (
         ({"vessel": "marinner"}, pdf, 404, "no_vessel"),
@@ -89,6 +120,9 @@ def test_a_correction_is_previewed_stored_and_taken_back(working: Working, own: 
     assert client.get("/v/mariner/segments.json").json() == before  # nothing is stored
     assert seen["result"]["planned"]["following"]["superseded"] and "<b>" not in seen["page"]
     stored = asked(client, "correct", **hidden(seen["page"], "Store it"))
+    # the page stays: what undoes it, and what follows, is nowhere else
+    assert stored["result"]["to"] == f"/jobs/{stored['id']}" and "are superseded" in stored["page"]
+    assert 'value="reprocess"' in form_of(stored["page"], "Identify her again")
     assert client.get(f"/segments/{name}.json").json()["excluded"] == fields["reason"]
     printed = kempf("segments", "corrections", "--vessel", "mariner", "--warehouse", own, "--json").json
     assert [one["action"] for one in printed] == ["exclude"]
@@ -150,6 +184,36 @@ def test_a_note_is_text_whatever_is_in_it(working: Working, own: Path):
     assert client.post("/notes", data=note).status_code == 403
 
 
+@pytest.mark.parametrize(
+    ("place", "button", "choices"),
+    [
+        ("predict", "Predict it", {"manoeuvre": "zigzag", "angles": "10/10"}),
+        ("what-if", "Move it", {"parameter": "b2"}),
+        ("next-trial", "Find the next trial", {"parameter": "b2"}),
+    ],
+)
+def test_what_is_chosen_is_what_the_button_asks_for(
+    writing: TestClient, place: str, button: str, choices: dict[str, str]
+):
+    page = writing.get(f"/v/mariner/{place}").text
+    form = form_of(page, button)
+    assert ">Show<" not in page and form.count("<button") == 1 and 'method="post"' in form
+    assert all(re.search(f'<(select|input) name="{name}"', form) for name in choices)
+    kind = re.search(r'name="kind" value="(\w+)"', form)
+    assert kind is not None
+    fields = {"kind": kind[1], "vessel": "mariner", **hidden(page, button), **choices}
+    asked_for = writing.get(writing.post("/jobs", data=fields, headers=OURS).headers["location"] + ".json").json()
+    assert choices.items() <= asked_for["arguments"].items()
+    # where it is being made is said at the address of the choice
+    assert asked_for["id"] in writing.get(f"/v/mariner/{place}", params={**hidden(page, button), **choices}).text
+
+
+def test_one_who_may_only_read_looks_at_what_is_made(client: TestClient):
+    page = client.get("/v/mariner/predict").text
+    form = form_of(page, "Show")
+    assert 'method="get"' in form and 'action="/v/mariner/predict"' in form and "Predict it: open the address" in page
+
+
 def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, own: Path):
     client, _, _ = working
     place = "/v/mariner/predict?manoeuvre=zigzag&angles=20/20"
@@ -163,6 +227,49 @@ def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, o
         *("predict", "zigzag", "--angles", "20/20", "--vessel", "mariner", "--compare"), "--warehouse", own, "--json"
     ).json
     assert client.get(place.replace("predict?", "predict.json?")).json() == printed
+    # asked for once more it is there at once
+    once_more = {"kind": "sail", "vessel": "mariner", **hidden(page.text, "Predict it")}
+    assert client.post("/jobs", data=once_more, headers=OURS).headers["location"] == place
+
+
+def test_what_limits_a_prediction_is_above_its_figures_and_measured_circles_are_named(
+    writing: TestClient, tmp_path: Path
+):
+    page = writing.get("/v/mariner/predict").text
+    fields = {"kind": "sail", "vessel": "mariner", **hidden(page, "Predict it")}
+    writing.post("/jobs", data=fields, headers=OURS)
+    queue = Queue(tmp_path / "state" / "jobs.sqlite")
+    (job,) = queue.active()
+    queue.take()
+    figure = {"value": 1.193, "low": 1.1, "high": 1.3}
+    beside = {"figure": "steady_yaw_rate_deg_s", "measured": 1.64, "measured_low": None, "measured_high": None}
+    measured = {
+        "segment_id": "seg-1",
+        "side": "port",
+        "sample": "held_out",
+        "why": "",
+        "figures": [{**beside, **figure}],
+    }
+    measured["figures"][0]["inside"] = True
+    why = "extrapolated in drift angle and rudder"
+    advance = {"name": "advance", "limit": 724.2, "unit": "m", "probability": 0.84, "why": why}
+    document = {
+        "manoeuvre": {"kind": "turning-circle", "rudder_deg": 35.0, "side": "starboard"},
+        "figures": {"steady_yaw_rate_deg_s": figure},
+        "imo": [advance],
+        "extrapolated": [{"sentence": "rudder up to 35 deg, the logs cover 20 deg"}],
+        "limits": ["42 of 256 ships that the errors allow do not sail it"],
+        "measured": [measured],
+        "assumed": [],
+    }
+    curve = [[float(k), 0.0, 0.1, 0.0, 5.0, 10.0 * k, float(k)] for k in range(3)]
+    queue.finish(job.id, {"to": "/", "document": document, "curves": {"estimates": [curve], "ships": []}})
+    page = writing.get("/v/mariner/predict").text
+    places = [page.index(words) for words in ("Extrapolated: rudder", "42 of 256", "<h2>Figures", "<h2>IMO", why)]
+    assert places == sorted(places) and "probability of 84 %" in page
+    table = page[page.index("<h2>Measured") :]
+    assert "yaw rate in the last turn" in table and "steady yaw rate" not in table
+    assert "while her speed still falls" in table and "steady yaw rate" in page
 
 
 def test_the_next_trial_is_the_one_that_the_command_proposes(working: Working, own: Path):

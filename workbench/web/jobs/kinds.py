@@ -6,6 +6,7 @@ Each takes the warehouse, the folder of what is kept, its arguments and a `Progr
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -86,6 +87,25 @@ def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pr
     return {"to": f"/diagnoses/{diagnosis.diagnosis_id}"}
 
 
+def report(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Write the report of a diagnosis, made first where it is not stored; the file is that of `kempf report`."""
+    from kempf.workbench.chosen_model import chosen_model
+    from kempf.workbench.report.build import make_report
+    from kempf.workbench.report.file_name import called_after
+    from kempf.workbench.web.data.reports import keep
+
+    vessel = arguments["vessel"]
+    spec, own = chosen_model(warehouse, vessel, arguments["set"] or None, None)
+    made = make_report(warehouse, vessel, spec, own, progress)
+    return {
+        "report": keep(state, made.html),
+        "file_name": called_after(vessel),
+        "bytes": len(made.html.encode()),
+        "diagnosis_id": made.diagnosis_id,
+        "headline": made.content.wording.headline,
+    }
+
+
 def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Add an effect to a vessel's current model."""
     from kempf.flows.jobs.add_effect import add_effect
@@ -131,8 +151,19 @@ def ingest(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], prog
     outcomes = take_in(warehouse, paths, arguments["vessel"], profiles, progress, new_vessel=new)
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(failed) == len(outcomes):
-        raise failed[0]
+        raise _with_draft(failed[0], paths[0], arguments["vessel"])
     return {"outcomes": [{**outcome.show(), "path": Path(outcome.path).name} for outcome in outcomes]}
+
+
+def _with_draft(error: KempfError, log: Path, vessel: str) -> KempfError:
+    """Return the error of a log that needs a profile with the draft of one, for a person to correct."""
+    if error.code == "no_source_for_log":
+        from kempf.flows.jobs.draft_profile import draft
+
+        with suppress(KempfError):
+            # a JSON text is a YAML one
+            error.details["draft"] = draft(log).replace('vessel: "?"', f"vessel: {json.dumps(vessel)}", 1)
+    return error
 
 
 def preview(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -146,7 +177,7 @@ def correct(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     progress(0, 1, "looking through the log with the correction")
     planned = _planned(warehouse, arguments)
     planned.store(warehouse)
-    return {"to": f"/segments/{planned.after.segment_id}", "planned": planned.show()}
+    return {"planned": planned.show()}  # its own page says what can be done next
 
 
 def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
@@ -250,6 +281,7 @@ KINDS: Mapping[str, Kind] = {
     "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),
     "changes": Kind(examine, "Look for changes", ("as_of",)),
     "diagnose": Kind(diagnose, "Diagnose", ()),
+    "report": Kind(report, "Write the report", ("set",), changes=True),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),
     "add": Kind(add, "Add the effect", ("effect", "formula", "standing"), changes=True),
     "undo": Kind(undo, "Undo the last effect", ("standing",), changes=True),

@@ -168,10 +168,21 @@ class Queue:
         except NotFound:
             return None
 
-    def all(self) -> list[Job]:
-        """Return the jobs, the newest first."""
+    def all(self, most: int | None = None) -> list[Job]:
+        """Return the jobs, the newest first, all or so many."""
         with self._connected() as file:
-            return [_job(row) for row in file.execute("SELECT * FROM jobs ORDER BY number DESC")]
+            query = "SELECT * FROM jobs ORDER BY number DESC LIMIT ?"
+            return [_job(row) for row in file.execute(query, (-1 if most is None else most,))]
+
+    def active(self) -> list[Job]:
+        """Return the jobs that wait or run, in the order in which they are done; none where their file was deleted."""
+        if not self.path.exists():
+            return []
+        with self._connected() as file:
+            rows = file.execute(
+                "SELECT * FROM jobs WHERE state IN (?, ?) ORDER BY state != ?, number", (*ACTIVE, RUNNING)
+            )
+            return [_job(row) for row in rows]
 
     def ticks(self, name: str, after: int = 0) -> list[Tick]:
         """Return how far a job was, from a number on that is not among them."""

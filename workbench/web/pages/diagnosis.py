@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.standing_model import current_effects
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, diagnoses
 from kempf.workbench.web.addresses import of_vessel
@@ -33,12 +34,16 @@ def document(desk: Desk, diagnosis_id: str) -> dict[str, Any]:
 def gather(desk: Desk, diagnosis_id: str) -> Page:
     """Return the page of a diagnosis."""
     diagnosis = document(desk, diagnosis_id)
+    vessel = diagnosis["vessel"]
+    has = current_effects(desk.warehouse, vessel).get(vessel, ())
     ranked = sorted(diagnosis["candidates"], key=lambda c: (c["score"] is None, -(c["score"] or 0.0)))
     content = {
         "one": diagnosis,
         "ranked": [c for c in ranked if c["score"] is not None],
         "untestable": [c for c in ranked if c["score"] is None],
         "ladder": draw_ladder(diagnosis["ladder"]),
-        "standing": aliases.of_vessel(desk.warehouse, diagnosis["vessel"]).get(aliases.CURRENT, ""),
+        "standing": aliases.of_vessel(desk.warehouse, vessel).get(aliases.CURRENT, ""),
+        # what her current model has of each set by now
+        "sets": [(found, [effect for effect in found["effects"] if effect in has]) for found in diagnosis["sets"]],
     }
-    return Page("diagnosis.html", "Diagnosis", content, ((diagnosis["vessel"], of_vessel(diagnosis["vessel"])),))
+    return Page("diagnosis.html", "Diagnosis", content, ((vessel, of_vessel(vessel)),))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.standing_model import current_effects
 from kempf.schemas.effects import catalogue, get
 from kempf.warehouse import diagnoses
 from kempf.workbench.web.desk import Desk
@@ -31,7 +32,13 @@ def gather_list() -> Page:
 def gather(desk: Desk, name: str) -> Page:
     """Return the page of an effect."""
     effect = get(name)
-    ships = sorted(
+    named = sorted(
         vessel for vessel, diagnosis in diagnoses.newest(desk.warehouse).items() if name in diagnosis.effects
     )
-    return Page("effect.html", effect.title, {"effect": effect, "ships": ships}, (("Effects", "/effects"),))
+    by_now = current_effects(desk.warehouse)
+    content = {
+        "effect": effect,
+        "lacking": [vessel for vessel in named if name not in by_now.get(vessel, ())],
+        "having": [vessel for vessel, effects in by_now.items() if name in effects],
+    }
+    return Page("effect.html", effect.title, content, (("Effects", "/effects"),))

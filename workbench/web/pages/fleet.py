@@ -11,13 +11,14 @@ from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.instant import iso_utc
-from kempf.warehouse.vessel_counts import vessel_counts
+from kempf.warehouse.vessel_counts import counted, vessel_counts
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages.page import Page
 
 FLOW = "reprocess"
 #: vessels, and files in quarantine, that a page shows
 MOST, MOST_FILES = 200, 20
+_OUTDATED = "her models rest on manoeuvres that count no longer"
 
 
 def document(desk: Desk) -> list[dict[str, Any]]:
@@ -31,18 +32,19 @@ def gather(desk: Desk) -> Page:
     messages = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
     last = {row["vessel"]: row for row in views.run_history(desk.warehouse).rows(named=True)}
     rows = []
-    for row in document(desk):
-        message, ran = messages.get(row["vessel"], {}), last.get(row["vessel"])
-        every = known.get(row["vessel"], [])
+    for vessel in counted(desk.warehouse):
+        message, ran = messages.get(vessel.vessel, {}), last.get(vessel.vessel)
+        every = known.get(vessel.vessel, [])
         rows.append(
             {
-                **row,
+                **vessel.show(),
+                "fitted": vessel.effects,
                 "diagnosis": every[-1] if every else None,
                 "since": {effect: _since(every, effect) for effect in every[-1].effects} if every else {},
                 "failures": [
                     f"{failure['what']}: {failure['error']['message']}" for failure in message.get("failures", ())
                 ],
-                "findings": _findings(message.get("findings", ())),
+                "findings": [*([_OUTDATED] if vessel.outdated else []), *_findings(message.get("findings", ()))],
                 "ran_at": f"{ran['run_at']:%Y-%m-%d %H:%M}" if ran and ran["run_at"] else None,
                 "ran": _address_of_run(ran["flow_run"]) if ran else None,
             }

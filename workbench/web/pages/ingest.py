@@ -28,17 +28,34 @@ def ask(desk: Desk, received: Received) -> Job:
     NotFound
         ``no_vessel``.
     """
-    from kempf.flows.jobs.files import read_profiles
-
     files, profile = received.files.get("log", []), received.files.get("profile", [])
     if not files:
         raise UsageError("no_file", "No log was sent.", "Choose one or several files, then send the form again.")
+    vessel, new = received.fields.get("vessel", "").strip() or None, received.fields.get("new_vessel", "")
+    return _queued(desk, files, profile, vessel, new)
+
+
+def ask_with_profile(desk: Desk, failed: Job, text: str) -> Job:
+    """Put the logs of a job that failed into the queue again, with a profile that a person corrected on its page.
+
+    Raises
+    ------
+    UsageError
+        ``job_unknown``: the job took no logs in; and what is wrong with the profile.
+    """
+    if failed.kind != "ingest":
+        raise UsageError("job_unknown", f"The job {failed.id} took no logs in.", "Send them from the page that does.")
+    profile = desk.uploads.store_text(text, "profile.yaml")
+    asked = failed.arguments
+    return _queued(desk, asked["files"], [*asked["profile"], profile], asked["vessel"], asked["new_vessel"])
+
+
+def _queued(desk: Desk, files: list[str], profile: list[str], vessel: str | None, new: str) -> Job:
+    from kempf.flows.jobs.files import read_profiles
+
     profiles = read_profiles(paths_of(desk.state, profile)) if profile else None
-    new = received.fields.get("new_vessel", "")
     # a slip of the hand in the name is said at once
-    name, _ = settle_vessel(
-        desk.warehouse, received.fields.get("vessel", "").strip() or None, profiles, new_vessel=bool(new)
-    )
+    name, _ = settle_vessel(desk.warehouse, vessel, profiles, new_vessel=bool(new))
     arguments = {"vessel": name, "files": files, "profile": profile, "new_vessel": new}
     state = fleet_state(desk.warehouse, [name])[name]
     return desk.queue.ask("ingest", arguments, state.digest, again=True)

@@ -20,7 +20,7 @@ from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
-from kempf.workbench.web.jobs.queue import ACTIVE, Job
+from kempf.workbench.web.jobs.queue import ACTIVE, DONE, FAILED, QUEUED, Job
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.window import instant
 
@@ -48,6 +48,8 @@ def gather(desk: Desk, name: str) -> Page:
     ticks = desk.queue.ticks(name)
     # one piece of work ticks many times
     pieces = [piece for piece, _ in groupby(tick.what for tick in ticks)]
+    if job.state == FAILED and pieces[-1:] == ["done"]:  # with every file looked at, none of which went in
+        pieces.pop()
     iterations = [(tick.what, tick.figures) for tick in ticks if tick.figures is not None]
     shown = iterations[-_MOST:]
     figures = [iteration for _, iteration in shown]
@@ -55,8 +57,12 @@ def gather(desk: Desk, name: str) -> Page:
         **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
         **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
     }
+    waiting = [one.id for one in desk.queue.active()]
+    content["before"] = waiting.index(job.id) if job.state == QUEUED and job.id in waiting else 0
     vessel = job.arguments["vessel"]
-    return Page("job.html", f"{KINDS[job.kind].title}: {vessel}", content, ((vessel, of_vessel(vessel)),))
+    return Page(
+        "job.html", f"{KINDS[job.kind].title}: {vessel}", content, (("Jobs", "/jobs"), (vessel, of_vessel(vessel)))
+    )
 
 
 def ask(desk: Desk, form: Mapping[str, str]) -> Job:
@@ -77,6 +83,12 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
     require_current(desk.warehouse, vessel, form.get("standing"))
     arguments, digest = settled(desk, kind, vessel, form)
     return desk.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
+
+
+def place_of(job: Job) -> str:
+    """Return where an answer is that is made already and that the job keeps; else the page of the job."""
+    made = job.result if job.state == DONE else {}
+    return str(made["to"]) if "to" in made and "document" in made else f"/jobs/{job.id}"
 
 
 def settled(desk: Desk, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
@@ -106,6 +118,11 @@ def _sail(desk: Desk, arguments: Arguments) -> None:
 def _name_the_set(desk: Desk, arguments: Arguments) -> None:
     name = arguments["set"] or None
     arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], name)[0].parameter_set_id
+
+
+def _known_set(desk: Desk, arguments: Arguments) -> None:
+    if arguments["set"]:
+        _name_the_set(desk, arguments)
 
 
 def _formula(desk: Desk, arguments: Arguments) -> None:
@@ -154,6 +171,7 @@ _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "explain": _stretch,
     "what_if": _name_the_set,
     "next_trial": _name_the_set,
+    "report": _known_set,
     "sail": _sail,
     "changes": _then,
     "try": _formula,

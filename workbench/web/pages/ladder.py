@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.workbench.documents.ladder import ladder_document
 from kempf.workbench.rungs import compared, remarks
 from kempf.workbench.web.addresses import of_vessel
@@ -23,6 +24,7 @@ def gather(desk: Desk, vessel: str) -> Page:
     beside = compared(rungs)
     content = {
         "vessel": vessel,
+        "stale": said_of_vessel(desk.warehouse, vessel),
         "rungs": list(zip(rungs, beside, strict=True)),
         "drawn": draw_ladder(rungs),
         "remarks": remarks(beside),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.pipeline.compare.evidence import SAMPLES, Evidence, evidence_in
 from kempf.schemas.errors import NotFound
 from kempf.workbench.web.addresses import of_vessel
@@ -48,6 +49,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     prediction_before: KeptPrediction | None = None
     content: dict[str, Any] = {
         "vessel": vessel,
+        "stale": said_of_vessel(desk.warehouse, vessel),
         "set_id": set_id,
         "horizon": horizon,
         "horizons": [pair for pair in HORIZONS if pair[0] != "legs" or by_legs],

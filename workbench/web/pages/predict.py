@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kempf.workbench.manoeuvre_figures import FIGURES, in_words
+from kempf.flows.jobs.out_of_date import said_of_vessel
+from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.sailed import MANOEUVRES
 from kempf.workbench.web.desk import Desk
@@ -30,6 +31,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     reply = answer(desk, "sail", vessel, fields)
     content: dict[str, Any] = {
         "vessel": vessel,
+        "stale": said_of_vessel(desk.warehouse, vessel),
         "asked": reply.arguments,
         "manoeuvres": MANOEUVRES,
         "made": reply.document,
@@ -41,6 +43,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
             "drawn": draw_sailed(prediction["manoeuvre"], reply.made["curves"]),
             "rows": list(_rows(prediction)),
             "measured": list(_measured(prediction)),
+            "last_turn": LAST_TURN if prediction["manoeuvre"]["kind"] == "turning-circle" else None,
         }
     return Page("predict.html", "Predict a manoeuvre", content, ((vessel, of_vessel(vessel)),))
 
@@ -65,7 +68,8 @@ def _measured(prediction: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     for manoeuvre in prediction["measured"]:
         for figure in manoeuvre["figures"]:
             name, _, place = figure["figure"].partition(".")
-            words = in_words(name, int(place) if place else None, manoeuvre)
+            kind = prediction["manoeuvre"]["kind"]
+            words = beside_in_words(kind, name, int(place) if place else None, manoeuvre)
             yield {
                 **figure,
                 "words": words,

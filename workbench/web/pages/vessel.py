@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.flows.jobs.out_of_date import said_of_vessel
-from kempf.warehouse import diagnoses, history, notes
+from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS
+from kempf.warehouse import aliases, diagnoses, history, notes
 from kempf.workbench.documents.logs import listed_logs
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.documents.parameter_sets import listed_sets
 from kempf.workbench.documents.vessel import vessel_document
 from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.pages import changes
+from kempf.workbench.web.pages import changes, jobs
 from kempf.workbench.web.pages.page import Page
 
 #: entries of a list that the page shows
@@ -39,7 +40,9 @@ def gather(desk: Desk, vessel: str) -> Page:
         ),
         "diagnoses": [diagnosis.show() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
         "notes": [note.show() for note in notes.of_vessel(warehouse, vessel)],
-        "current": any("current" in row["aliases"] for row in sets),
+        "current": any(aliases.CURRENT in row["aliases"] for row in sets),
+        "ladder": any(aliases.CURRENT in row["aliases"] and row["estimator"] in (POOLED, WITH_EFFECTS) for row in sets),
+        "jobs": jobs.rows([job for job in desk.queue.active() if job.arguments["vessel"] == vessel]),
         "stale": said_of_vessel(warehouse, vessel),
         "history": over_time.get("drawn"),
         "tested": over_time.get("tested"),
