@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.workbench.web.data.signs import STARBOARD
 from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.shades import shades
@@ -20,9 +21,9 @@ _DEG = 180.0 / np.pi
 Line = tuple[Float, str]
 #: column, words, factor to the unit shown
 _SHOWN = (
-    ("yaw_rate", "rad_s", "yaw rate, deg/s", _DEG),
+    ("yaw_rate", "rad_s", f"yaw rate, deg/s ({STARBOARD})", _DEG),
     ("heading", "rad", "heading, deg", _DEG),
-    ("lateral_speed", "m_s", "lateral speed, m/s", 1.0),
+    ("lateral_speed", "m_s", f"lateral speed, m/s ({STARBOARD})", 1.0),
 )
 
 
@@ -103,7 +104,7 @@ def _figure(
     end = float(time[-1])
     shown = [(words, lines) for words, lines in panels if np.isfinite(lines[0][0]).any()]
     parts, top = [], 0.0
-    for words, lines in (("rudder, deg", [(_DEG * rudder_rad, "rudder")]), *shown):
+    for words, lines in ((f"rudder, deg ({STARBOARD})", [(_DEG * rudder_rad, "rudder")]), *shown):
         if marked is not None:
             parts += shades(time, marked, _LEFT, (_WIDTH - _LEFT - 12.0) / max(end, 1e-9), top, _PANEL)
         parts += _panel(top, words, time, end, lines)

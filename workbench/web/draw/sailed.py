@@ -8,16 +8,17 @@ from typing import Any
 
 from markupsafe import Markup
 
+from kempf.workbench.web.data.signs import STARBOARD
 from kempf.workbench.web.draw.frame import BOTTOM, LEFT, RIGHT, TOP, Frame
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _HEIGHT = 760.0, 340.0
 #: by kind: columns across and up with their factors, and what the axes are
 _AXES = {
-    "turning-circle": ((1, 1.0), (0, 1.0), "across the approach, m", "along the approach, m"),
-    "zigzag": ((0, 1.0), (1, degrees(1.0)), "time from the first execute, s", "heading and rudder, deg"),
-    "pull-out": ((0, 1.0), (1, degrees(1.0)), "time from the order amidships, s", "yaw rate, deg/s"),
-    "spiral": ((0, degrees(1.0)), (1, degrees(1.0)), "rudder, deg", "steady yaw rate, deg/s"),
+    "turning-circle": ((1, 1.0), (0, 1.0), "across the approach, m, to the side of the turn +", "along the approach, m"),
+    "zigzag": ((0, 1.0), (1, degrees(1.0)), "time from the first execute, s", f"heading and rudder, deg, {STARBOARD}"),
+    "pull-out": ((0, 1.0), (1, degrees(1.0)), "time from the order amidships, s", "yaw rate, deg/s, to the side of the turn +"),
+    "spiral": ((0, degrees(1.0)), (1, degrees(1.0)), f"rudder, deg, {STARBOARD}", f"steady yaw rate, deg/s, {STARBOARD}"),
 }
 _RUDDER_COLUMN = 2
 Points = list[tuple[float, float]]
@@ -57,6 +58,7 @@ def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]
     parts += [frame.line([p for p in points(curve) if left <= p[0] <= right], "line-ship") for curve in curves["ships"]]
     if rudder:
         parts.append(frame.line(rudder, "line-rudder"))
+        parts.append(_beside_the_rudder(frame, rudder))
     for place, curve in enumerate(curves["estimates"]):
         shown = [p for p in points(curve) if left <= p[0] <= right]
         parts.append(frame.line(shown, "line-other" if place else "line-predicted"))
@@ -66,6 +68,16 @@ def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]
     return drawing(
         _WIDTH, height, "The manoeuvre as the estimates have it, and as other ships that the data allow", *parts
     )
+
+
+def _beside_the_rudder(frame: Frame, rudder: Points) -> Markup:
+    """Say which line is the rudder where it is first held to the second side; at the first it would meet the axis."""
+    held = max(abs(angle) for _, angle in rudder)
+    first = next((angle for _, angle in rudder if abs(angle) > 0.9 * held), 0.0)
+    second = [point for point in rudder if abs(point[1]) > 0.9 * held and point[1] * first < 0.0]
+    at, angle = second[0] if second else rudder[-1]
+    above = angle > 0.0
+    return element("text", "rudder", x=frame.x(at), y=frame.y(angle) + (-5.0 if above else 13.0), class_="label")
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:
