@@ -15,10 +15,25 @@ from kempf.workbench.web.draw.svg import drawing, element
 _WIDTH, _HEIGHT = 760.0, 340.0
 #: by kind: columns across and up with their factors, and what the axes are
 _AXES = {
-    "turning-circle": ((1, 1.0), (0, 1.0), "across the approach, m, to the side of the turn +", "along the approach, m"),
+    "turning-circle": (
+        (1, 1.0),
+        (0, 1.0),
+        "across the approach, m, to the side of the turn +",
+        "along the approach, m",
+    ),
     "zigzag": ((0, 1.0), (1, degrees(1.0)), "time from the first execute, s", f"heading and rudder, deg, {STARBOARD}"),
-    "pull-out": ((0, 1.0), (1, degrees(1.0)), "time from the order amidships, s", "yaw rate, deg/s, to the side of the turn +"),
-    "spiral": ((0, degrees(1.0)), (1, degrees(1.0)), f"rudder, deg, {STARBOARD}", f"steady yaw rate, deg/s, {STARBOARD}"),
+    "pull-out": (
+        (0, 1.0),
+        (1, degrees(1.0)),
+        "time from the order amidships, s",
+        f"yaw rate, deg/s, {STARBOARD}",
+    ),
+    "spiral": (
+        (0, degrees(1.0)),
+        (1, degrees(1.0)),
+        f"rudder, deg, {STARBOARD}",
+        f"steady yaw rate, deg/s, {STARBOARD}",
+    ),
 }
 _RUDDER_COLUMN = 2
 Points = list[tuple[float, float]]
@@ -54,17 +69,19 @@ def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]
             room = (right - left) * (height / (1.2 * _WIDTH) - 1.0) / 2.0
             left, right, height = left - room, right + room, 1.2 * _WIDTH
     frame = Frame(_WIDTH, height, (left, right), (low, high))
-    parts = frame.grid(across, up)
+    parts = frame.grid()
     parts += [frame.line([p for p in points(curve) if left <= p[0] <= right], "line-ship") for curve in curves["ships"]]
     if rudder:
         parts.append(frame.line(rudder, "line-rudder"))
-        parts.append(_beside_the_rudder(frame, rudder))
     for place, curve in enumerate(curves["estimates"]):
         shown = [p for p in points(curve) if left <= p[0] <= right]
         parts.append(frame.line(shown, "line-other" if place else "line-predicted"))
     if low < 0.0 < high:
         zero = frame.y(0.0)
         parts.append(element("line", x1=LEFT, x2=_WIDTH - RIGHT, y1=zero, y2=zero, class_="axis"))
+    parts += frame.words(across, up)
+    if rudder:
+        parts.append(_beside_the_rudder(frame, rudder))
     return drawing(
         _WIDTH, height, "The manoeuvre as the estimates have it, and as other ships that the data allow", *parts
     )
@@ -77,7 +94,7 @@ def _beside_the_rudder(frame: Frame, rudder: Points) -> Markup:
     second = [point for point in rudder if abs(point[1]) > 0.9 * held and point[1] * first < 0.0]
     at, angle = second[0] if second else rudder[-1]
     above = angle > 0.0
-    return element("text", "rudder", x=frame.x(at), y=frame.y(angle) + (-5.0 if above else 13.0), class_="label")
+    return element("text", "rudder", x=frame.x(at), y=frame.y(angle) + (-5.0 if above else 13.0), class_="label strong")
 
 
 def _ends(values: Sequence[float]) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, diagnoses
+from kempf.workbench.rungs import first_model
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.ladder import draw_ladder
@@ -25,7 +26,7 @@ def document(desk: Desk, diagnosis_id: str) -> dict[str, Any]:
         raise NotFound(
             "no_diagnosis",
             f"No diagnosis has the id {diagnosis_id[:40]!r}.",
-            "A vessel's page lists her diagnoses; `kempf diagnose --vessel NAME` makes one.",
+            "A vessel's page lists her diagnoses, and makes one.",
         )
     return diagnosis.show()
 
@@ -38,6 +39,7 @@ def gather(desk: Desk, diagnosis_id: str) -> Page:
         "one": diagnosis,
         "ranked": [c for c in ranked if c["score"] is not None],
         "untestable": [c for c in ranked if c["score"] is None],
+        "first_model": first_model(diagnosis["ladder"][0]),
         "ladder": draw_ladder(diagnosis["ladder"]),
         "standing": aliases.of_vessel(desk.warehouse, diagnosis["vessel"]).get(aliases.CURRENT, ""),
     }
