@@ -215,5 +215,6 @@ def test_two_sets_are_compared_as_the_command_compares_them(working: Working, ow
     for short, words in (("1", "one step"), ("10s", "10 s"), ("60s", "60 s")):  # made with it: no page has to wait
         page = client.get(f"/v/mariner/model?set={second}&h={short}").text
         # the errors are those of this horizon, the free run's beside them
-        assert "not made yet" not in page and re.search(rf"rms of yaw rate, {words}[^<]*, deg/s</th>", page)
+        assert "not made yet" not in page and "rms of yaw rate, deg/s</th>" in page
+        assert re.search(rf"Rms errors: {words}[^<]*\. Free-run errors", page)
         assert re.search(r"(times the errors of a right model|rms [0-9.]+ deg)[^<]* zigzag to ", page)

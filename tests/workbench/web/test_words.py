@@ -94,12 +94,14 @@ def test_a_size_that_no_ship_has_is_marked():
     def size(value: float, std: float | None, unit: str) -> dict[str, Any]:
         return {"value": value, "std": std, "unit": unit}
 
-    assert sizes_of({"effect": "antenna_lever", "size": {"x": size(-3000.0, 20.0, "m")}}).endswith(
-        "(beyond what is physical)"
-    )
-    waves = sizes_of({"effect": "waves", "size": {"c": size(0.002, 0.0004, "rad"), "k": size(2.5, None, "1")}})
-    assert waves == "c 0.1146 ± 0.023 deg, k 2.5 (held)"
-    assert sizes_of({"effect": "own", "size": {"c": size(1e9, 1.0, "1")}}) == "c 1e+09 ± 1"
+    lever = {"effect": "antenna_lever", "size": {"x": size(-193.9, 97.0, "m")}}
+    assert sizes_of(lever, 161.0) == "x -193.9 ± 97 m (beyond what is physical)"
+    assert sizes_of(lever, 400.0) == sizes_of(lever, None) == "x -193.9 ± 97 m"
+    current = {"effect": "earth_current", "size": {"c2": size(1372.0, 633.0, "m/s")}}
+    assert sizes_of(current, None).endswith("(beyond what is physical)")
+    waves = {"effect": "waves", "size": {"c": size(0.002, 0.0004, "rad"), "k": size(2.5, None, "1")}}
+    assert sizes_of(waves, 161.0) == "c 0.1146 ± 0.023 deg, k 2.5 (held)"
+    assert sizes_of({"effect": "own", "size": {"c": size(1e9, 1.0, "1")}}, None) == "c 1e+09 ± 1"
 
 
 def test_manoeuvres_are_named_by_their_log_where_a_logger_has_no_calendar():

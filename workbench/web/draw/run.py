@@ -103,7 +103,7 @@ def _figure(
     """Draw the rudder and below it every panel whose first line was measured."""
     end = float(time[-1])
     shown = [(words, lines) for words, lines in panels if np.isfinite(lines[0][0]).any()]
-    parts, top = [], 0.0
+    parts, top = [], _GAP - 4.0
     for words, lines in ((f"rudder, deg ({STARBOARD})", [(_DEG * rudder_rad, "rudder")]), *shown):
         if marked is not None:
             parts += shades(time, marked, _LEFT, (_WIDTH - _LEFT - 12.0) / max(end, 1e-9), top, _PANEL)
@@ -146,5 +146,5 @@ def _panel(top: float, words: str, time: Float, end: float, lines: Sequence[Line
             path = "M" + " ".join(f"{a:.1f} {b:.1f}" for a, b in places) if places else ""
         if path:
             parts.append(element("path", d=path, fill="none", class_=f"line-{kind}"))
-    parts.append(element("text", words, x=_LEFT + 6.0, y=top + 13.0, class_="label strong"))
+    parts.append(element("text", words, x=_LEFT, y=top - 5.0, class_="label strong"))
     return parts
