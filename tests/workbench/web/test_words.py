@@ -79,7 +79,7 @@ def test_a_diagnosis_calls_absent_only_what_was_not_seen(client: TestClient, mon
         "candidates": [
             candidate("dead_time", "absent", 499.0, "no longer significant once first-order rudder lag is included"),
             candidate("rudder_lag", "present", 437.0, "step 1"),
-            candidate("backlash", "absent", 158.0, "significant by itself; not refitted, as others explain more"),
+            candidate("backlash", "absent", 158.0, "significant by itself; not refitted, as others promised more"),
             candidate("waves", "absent", 1.0, "not seen; upper limit (95 %): |c| < 1"),
         ],
     }
