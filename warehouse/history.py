@@ -121,7 +121,12 @@ def of_vessel(
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
             nothing = _exploded(None, vessel, _Logs([], None, [], code_of(warehouse, "estimate"), then=True))
-            return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
+            return History(
+                nothing,
+                None,
+                f"No parameter set of any vessel was stored by {as_of:%Y-%m-%d %H:%M:%S} UTC: what counts is when a "
+                "set was stored, not when she sailed.",
+            )
         frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None
     if not superseded:

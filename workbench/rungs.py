@@ -102,6 +102,12 @@ def effect_names(rung: Mapping[str, Any]) -> list[str]:
     return list(dict.fromkeys(name.partition(".")[0] for name in rung.get("effects") or ()))
 
 
+def first_model(rung: Mapping[str, Any]) -> str:
+    """Return what the first model of a ladder is called: the plain one, or one that has effects already."""
+    effects = effect_names(rung)
+    return "model with " + ", ".join(effects) if effects else "plain model"
+
+
 def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
     """Return the free-run error of each manoeuvre with the parameters fitted to legs, percent of the motion.
 

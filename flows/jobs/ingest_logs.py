@@ -119,7 +119,7 @@ def settle_vessel(
     if vessel is not None and named is not None and vessel != named:
         raise UsageError(
             "profiles_disagree",
-            f"--vessel says {vessel!r}, the profile says {named!r}.",
+            f"The logs are said to be of {vessel!r}, the profile is that of {named!r}.",
             "Make them agree, or leave one of them out.",
             {"option": vessel, "profile": named},
         )
@@ -127,7 +127,7 @@ def settle_vessel(
     if name is None:
         raise UsageError(
             "no_vessel_named",
-            "Whose logs are these? Neither --vessel nor a profile names the vessel.",
+            "Whose logs are these? No vessel is named, and no profile names her.",
             "Add --vessel NAME; a folder with one folder a vessel is taken in with `kempf inbox FOLDER`.",
         )
     vessel_key(name)  # refuses a name that is none once, not for every log

@@ -236,7 +236,7 @@ def next_trial(
             "predicts_no_ship",
             f"By {set_models.parameter_set.parameter_set_id} she runs away in every one of the {len(ANGLES_DEG)} "
             "zigzags.",
-            "Choose another set with --set; `kempf params list` names them.",
+            "Choose another set; `kempf params list` names them.",
         )
     trials.sort(key=lambda trial: _rank(trial, parameter))
     predicted = predict_with(set_models, replace(request, angles_deg=trials[0].angles_deg), progress)

@@ -96,9 +96,11 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
     sentences = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
         approaches = [run.approach_m_s for run in basis.runs.runs]
-        mean = f"approach at {speed:.3g} m/s, the mean of the {len(approaches)} manoeuvres that were sailed"
+        count = len(approaches)
+        of = f"the mean of the {count} manoeuvres that were sailed" if count > 1 else "as in the one manoeuvre sailed"
+        mean = f"approach at {speed:.3g} m/s, {of}"
         if max(approaches) > _UNLIKE * min(approaches):
-            mean += f", from {min(approaches):.3g} to {max(approaches):.3g} m/s; --speed takes another"
+            mean += f", from {min(approaches):.3g} to {max(approaches):.3g} m/s; another speed can be asked for"
         sentences.append(mean)
     if basis.particulars.model_scale is not None:
         sentences.append(

@@ -94,7 +94,7 @@ def _against(found: Sequence[StoredDiagnosis], effects: Sequence[str]) -> tuple[
     if missing:
         return (
             f"{listed(list(dict.fromkeys(missing.values())))} found that the model lacks {listed(list(missing))}: that "
-            "is in no interval of this set; see `kempf effects add`",
+            "is in no interval of this set until it is added to the model",
         )
     left = [d for d in of_less if d.verdict in _LEFT]
     if not left:

@@ -155,7 +155,7 @@ def what_if(
         raise DataRejected(
             "prediction_diverges",
             f"{bound_runs.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
-            "Choose another set with --set.",
+            "Choose another set.",
         )
     tried = []
     for done, move in enumerate(moves.tolist()):

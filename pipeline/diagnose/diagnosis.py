@@ -102,7 +102,7 @@ def diagnose(
     if len(chosen) > 1:
         listener.begins("predicting one leg ahead")
         shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
-    listener.begins(f"screening {len(effects)} effects")
+    listener.begins(f"screening {len(effects)} effect{'s' * (len(effects) != 1)}")
     screened = screen(base, effects, workers, listener)
     models: Sequence[Ahead | None] = [None] * len(fits) if shooting is None else shooting.way(fits)
     rungs = tuple(step_of(fit, held, ahead, workers) for fit, ahead in zip(fits[:-1], models[:-1], strict=True))

@@ -137,7 +137,9 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding
         return EffectFinding("absent", f"no longer significant once {listed(added)} is included")
     if refits:
         return EffectFinding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
-    return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
+    if diagnosis.before is None:
+        return EffectFinding("absent", "significant by itself; one manoeuvre alone does not confirm it")
+    return EffectFinding("absent", "significant by itself; not refitted, as others promised more")
 
 
 def climbed(diagnosis: Diagnosis) -> tuple[Step, ...]:

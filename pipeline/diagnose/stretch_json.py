@@ -132,7 +132,7 @@ def _sentences(stretch: Explained) -> list[str]:
         return lines
     first = best[0]
     share = _of_misfit(stretch, first)
-    line = f"First {first.effect.title}"
+    line = f"Ranked first is {first.effect.title}"
     line += f", which would explain {100.0 * share:.0f} % of the misfit" if share is not None else ""
     lines.append(line + f" (adjusted p = {first.p_adjusted:.1g}).")
     alike = [candidate.effect.title for candidate in best[1:] if candidate.effect.name in first.alike]

@@ -185,7 +185,7 @@ def _no_ship(first: OfModel, manoeuvre: Manoeuvre, logs: Reach, count: int) -> D
         f"{model.name} predicts no {manoeuvre.name}: {whose}{lost} of {count} ships that its errors allow run away or "
         f"never come to its end. {why}",
         "Sail a turning circle or a spiral beside the zigzags and let `kempf diagnose` look for the damping; or "
-        "predict with a set that has it (--set), or with less rudder: the logs cover "
+        "predict with a set that has it, or with less rudder: the logs cover "
         f"{degrees(logs.rudder_rad):.3g} deg.",
         {"no_ships": lost, "draws": count, "estimates_sail": not itself, "share_unstable": share},
     )

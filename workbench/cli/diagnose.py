@@ -12,7 +12,8 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
-from kempf.workbench.rungs import compared, effect_names
+from kempf.workbench.effect_verdicts import effect_verdict
+from kempf.workbench.rungs import compared, first_model
 from kempf.workbench.terminal import counted, number, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ _SHOWN = 12
 @vessel_option()
 @click.option("--fleet", is_flag=True, help="Every vessel of the warehouse, as a Prefect flow, and a summary.")
 @beginning_options
-@click.option("--all", "everything", is_flag=True, help="Also the effects that are absent or cannot be tested.")
+@click.option("--all", "everything", is_flag=True, help="Also the effects that were not seen or cannot be tested.")
 @warehouse_option
 @json_option
 def command(
@@ -119,7 +120,7 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
     click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
     for sentence in document["sentences"]:
         click.echo(f"  {sentence}")
-    first = _first_model(document["ladder"][0])
+    first = first_model(document["ladder"][0])
     beside = compared(document["ladder"])
     ladder = [
         [
@@ -151,12 +152,12 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
             number(candidate["score"], 3),
             _change(candidate["expected_change"]),
             number(candidate["absorption"], 3),
-            candidate["verdict"].replace("_", " "),
+            effect_verdict(candidate, document["verdict"]),
         ]
         for candidate in shown
     ]
     head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict"]
-    print_table(head, rows, f"Screened beside the {first}")
+    print_table(head, rows, f"Screened beside the {first}, by score")
     reasons: dict[str, list[str]] = {}
     for candidate in shown:
         reasons.setdefault(candidate["why"], []).append(candidate["effect"])
@@ -174,12 +175,6 @@ def next_commands(document: Mapping[str, Any]) -> list[str]:
     vessel = document["vessel"]
     adds = [f"kempf effects add {group['effects'][0]} --vessel {vessel}" for group in document["sets"]]
     return [*adds, f"kempf ladder --vessel {vessel}"]
-
-
-def _first_model(step: Mapping[str, Any]) -> str:
-    """Return what the diagnosis began from: the plain model, or one that has effects already."""
-    effects = effect_names(step)
-    return "model with " + ", ".join(effects) if effects else "plain model"
 
 
 def _change(change: Mapping[str, Mapping[str, Any]]) -> str:

@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment
 
 
+#: overshoots of a zigzag that a row has room for; the criteria are about the first two
+_OVERSHOOTS = 4
+
+
 @click.group("segments", cls=GivenOnceGroup, invoke_without_command=True)
 @vessel_option()
 @warehouse_option
@@ -91,7 +95,7 @@ def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str], file_of
             s.first_side,
             number(s.base_heading_deg),
             iso_utc(s.start_utc_ns)[:16],
-            " ".join(f"{angle:.1f}" for angle in s.overshoots_deg[:4]),
+            _overshoots(s.overshoots_deg),
             _imo(s.imo),
         ]
         for s in zigzags
@@ -99,6 +103,14 @@ def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str], file_of
     head = ["segment", *(["log"] if alike else []), "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
     click.echo("zigzag: heading at which the rudder is reversed / rudder angle, deg; K0: heading before it")
+    if any(len(s.overshoots_deg) > _OVERSHOOTS for s in zigzags):
+        click.echo("(+2): two more overshoots, which --json has")
+
+
+def _overshoots(angles_deg: Sequence[float]) -> str:
+    """Write the first overshoots, and how many more there are."""
+    more = len(angles_deg) - _OVERSHOOTS
+    return " ".join(f"{angle:.1f}" for angle in angles_deg[:_OVERSHOOTS]) + (f" (+{more})" if more > 0 else "")
 
 
 def _print_other(segment: Segment, short: str) -> None:

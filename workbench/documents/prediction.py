@@ -40,7 +40,7 @@ def judged(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     if widths:
         others = len(predicted) - len(widths)
         sentences.append(
-            f"half an interval is {_percent(median(widths))} % of what is predicted in the median, "
+            f"the intervals reach {_percent(median(widths))} % (median) to either side of what is predicted, "
             f"{_percent(max(widths))} % at most{f'; {others} intervals about nothing are left out' if others else ''}"
         )
     unknown = max((run.wind_force_std_m_s2 for run in measured if run.wind_force_m_s2 == 0.0), default=0.0)

@@ -63,8 +63,11 @@ def address_of(warehouse: Warehouse, query: str) -> str:
     text = query.strip()
     if text in vessels.names(warehouse):
         return of_vessel(text)
-    if text in catalogue():
-        return f"/effects/{text}"
+    # as the pages write it too, and by the title
+    effect = text.casefold().replace(" ", "_")
+    by_title = {one.title.casefold(): one.name for one in catalogue().values()}
+    if effect in catalogue() or text.casefold() in by_title:
+        return f"/effects/{effect if effect in catalogue() else by_title[text.casefold()]}"
     for form, begin in _KINDS:
         if form.fullmatch(text):
             return begin + text

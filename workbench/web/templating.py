@@ -8,9 +8,12 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from kempf.schemas.enumeration import at_the_beginning
 from kempf.workbench.documents.tried import refits
+from kempf.workbench.effect_verdicts import effect_verdict
 from kempf.workbench.rungs import in_words, sized
 from kempf.workbench.terminal import number
+from kempf.workbench.web import wording
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.pages.corrections import as_asked, undoing
 
@@ -40,11 +43,21 @@ def _templates() -> Environment:
         "words": words,
         "error": in_words,
         "sized": sized,
+        "probability": wording.probability,
         "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
         "vessel_address": of_vessel,
         "as_asked": as_asked,
         "undoing": undoing,
         "refits": refits,
+        "effect_verdict": effect_verdict,
+        "message": wording.message,
+        "next_step": wording.next_step,
+        "with_commands": wording.with_commands,
+        "without_command": wording.without_command,
+        "with_unit": wording.with_unit,
+        "estimator": wording.estimator,
+        "alias": wording.alias,
+        "beginning": at_the_beginning,
     }
     environment.filters |= filters
     return environment

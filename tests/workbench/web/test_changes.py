@@ -93,7 +93,10 @@ def test_three_occasions_are_too_few_and_it_says_so(opened: Open) -> None:
 def test_what_was_known_then_is_what_the_command_says_of_then(opened: Open, tmp_path: Path) -> None:
     client, place = opened(8), tmp_path / "w"
     long_ago = client.get(PAGE + "?as_of=2001-02-03").text
-    assert "No parameter set of any vessel was stored by 2001-02-03T23:59:59" in long_ago and "<figure>" not in long_ago
+    assert (
+        "No parameter set of any vessel was stored by 2001-02-03 23:59:59 UTC" in long_ago
+        and "<figure>" not in long_ago
+    )
     then = datetime.now(UTC).isoformat().replace("+00:00", "Z")
     put(place, *made_sets(16)[8:])
     looked_for(client, then)

@@ -65,6 +65,8 @@ def test_a_log_that_is_sent_is_the_log_that_is_ingested(working: Working, logs: 
     new = done(client, client.post("/ingest", data={"new_vessel": "yes"}, files=files, headers=OURS))
     (one,) = new["result"]["outcomes"]
     assert one["outcome"] == "new" and "<b>" not in new["page"]
+    for name in one["segments"]:  # by what it is, not "manoeuvre to fit" three times
+        assert re.search(rf'href="/segments/{name}">\d+/\d+ zigzag to (starboard|port)</a>', new["page"])
     listed = client.get("/v/sister/logs.json").json()
     assert [row["file_name"] for row in listed] == ["<b>mariner.csv"] and listed[0]["records_kept"] > 0
 
@@ -223,6 +225,8 @@ def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, o
     place = job["result"]["to"]
     page = client.get(place)
     assert page.status_code == 200 and len(page.content) < 100_000 and "IMO" in page.text
+    assert re.search(r'href="/segments/seg-[0-9a-f]+">20/20 zigzag to starboard, 20\d\d-', page.text)
+    assert "--" not in page.text.partition("<main")[2].replace("<!--", "")
     printed = kempf(
         *("predict", "zigzag", "--angles", "20/20", "--vessel", "mariner", "--compare"), "--warehouse", own, "--json"
     ).json
@@ -288,6 +292,7 @@ def test_a_parameter_is_moved_and_its_price_has_its_least_at_the_estimate(workin
     job = asked(client, "what_if", **hidden(client.get("/v/mariner/what-if?parameter=b1").text, "Move it"))
     page = client.get(job["result"]["to"])
     assert page.status_code == 200 and len(page.content) < 100_000 and page.text.count("line-try") >= 9
+    assert re.search(r'<option value="seg-[0-9a-f]+">20/20 zigzag to starboard, 20\d\d-', page.text)
     found = client.get(job["result"]["to"].replace("what-if?", "what-if.json?")).json()
     assert found == kempf("what-if", "b1", "--vessel", "mariner", "--warehouse", own, "--json").json
     prices = [one["log_likelihood_falls_by"] for one in found["tried"]]
@@ -314,5 +319,9 @@ def test_two_sets_are_compared_as_the_command_compares_them(working: Working, ow
     asked(client, "predict", set=second, horizon="free")
     beside = client.get(f"/v/mariner/model?set={second}&beside={first}")
     assert beside.status_code == 200 and "Predict with it" in beside.text
-    for short in ("1", "10s", "60s"):  # made with it: no page has to wait
-        assert "not made yet" not in client.get(f"/v/mariner/model?set={second}&h={short}").text
+    for short, words in (("1", "one step"), ("10s", "10 s"), ("60s", "60 s")):  # made with it: no page has to wait
+        page = client.get(f"/v/mariner/model?set={second}&h={short}").text
+        # the errors are those of this horizon, the free run's beside them
+        assert "not made yet" not in page and "rms of yaw rate, deg/s</th>" in page
+        assert re.search(rf"Rms errors: {words}[^<]*\. Free-run errors", page)
+        assert re.search(r"(times the errors of a right model|rms [0-9.]+ deg)[^<]* zigzag to ", page)

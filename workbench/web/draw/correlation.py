@@ -40,7 +40,7 @@ def draw_correlation(names: Sequence[str], covariance: Sequence[Sequence[float]]
                     "rect", x=x, y=y, width=_CELL - 2, height=_CELL - 2, class_=f"cell {kind}", fill_opacity=abs(value)
                 )
             )
-            words = "1" if i == k else f"{100.0 * value:.0f}"
+            words = f"{100.0 * value:.0f}"
             strong = " inverse" if abs(value) > 0.6 else ""
             parts.append(
                 element("text", words, x=x + _CELL / 2 - 1, y=y + 23.0, text_anchor="middle", class_=f"label{strong}")

@@ -11,7 +11,7 @@ from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import element
 
 #: room beside the frame for numbers and words
-LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 8.0, 36.0
+LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 22.0, 36.0
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,8 @@ class Frame:
         low, high = self.up
         return TOP + (self.height - TOP - BOTTOM) * (high - value) / ((high - low) or 1.0)
 
-    def grid(self, across: str, up: str) -> list[Markup]:
-        """Draw the grid, its numbers, and what the axes are."""
+    def grid(self) -> list[Markup]:
+        """Draw the grid and its numbers."""
         left, right = LEFT, self.width - RIGHT
         top, bottom = TOP, self.height - BOTTOM
         parts = [element("rect", x=left, y=top, width=right - left, height=bottom - top, fill="none", class_="frame")]
@@ -54,9 +54,21 @@ class Frame:
             y = self.y(tick)
             parts.append(element("line", x1=left, x2=right, y1=y, y2=y, class_="grid"))
             parts.append(element("text", f"{tick:g}", x=left - 6.0, y=y + 3.5, text_anchor="end", class_="label"))
-        parts.append(element("text", up, x=left + 6.0, y=top + 14.0, class_="label strong"))
-        parts.append(element("text", across, x=right, y=self.height - 4.0, text_anchor="end", class_="label strong"))
         return parts
+
+    def words(self, across: str, up: str) -> list[Markup]:
+        """Write what the axes are, outside the frame, where no line runs through it."""
+        return [
+            element("text", up, x=LEFT, y=TOP - 8.0, class_="label strong"),
+            element(
+                "text",
+                across,
+                x=self.width - RIGHT,
+                y=self.height - 4.0,
+                text_anchor="end",
+                class_="label strong",
+            ),
+        ]
 
     def line(self, points: Sequence[tuple[float, float]], kind: str) -> Markup:
         """Draw a line through points that are values of both axes; what is drawn ends at the frame."""

@@ -21,7 +21,7 @@ _WIDTH, _PANEL, _LEFT, _GAP = 640.0, 92.0, 64.0, 20.0
 def draw_history(
     rows: Sequence[Mapping[str, Any]], examined: Sequence[Mapping[str, Any]] = (), noted: Sequence[Note] = ()
 ) -> Markup | None:
-    """Return the hull's parameters of the model and estimator that most sets are of; None where none has an interval.
+    """Return the hull's parameters of the sets that `shown_kind` chooses; None where none has an interval.
 
     Parameters
     ----------
@@ -32,13 +32,10 @@ def draw_history(
     noted : sequence of Note, optional
         A line where each says that something happened.
     """
-    usable = [row for row in rows if row["low"] is not None and not row["superseded"] and row["converged"]]
-    usable = [row for row in usable if row["parameter"] in HULL_PARAMETERS]
-    kinds = Counter((row["model"], row["estimator"]) for row in usable)
-    if not kinds:
+    kind = shown_kind(rows)
+    if kind is None:
         return None
-    kind = max(kinds, key=lambda pair: (kinds[pair], pair))
-    shown = [row for row in usable if (row["model"], row["estimator"]) == kind]
+    shown = [row for row in _usable(rows) if (row["model"], row["estimator"]) == kind]
     names = [name for name in HULL_PARAMETERS if any(row["parameter"] == name for row in shown)]
     times = [row["start_utc_ns"] for row in shown]
     first, last = min(times), max(times)
@@ -63,6 +60,23 @@ def draw_history(
         parts.append(element("text", word, x=_x(at, first, last), y=bottom + 4.0, text_anchor=anchor, class_="label"))
     title = f"Parameters over time: model {kind[0]}, {kind[1]}; value and 95 % interval"
     return drawing(_WIDTH, bottom + 14.0, title, *parts, role="group")
+
+
+def shown_kind(rows: Sequence[Mapping[str, Any]]) -> tuple[str, str] | None:
+    """Return the model and the estimator that most sets are of; None where none has an interval.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of `kempf.warehouse.history.History.rows`.
+    """
+    kinds = Counter((row["model"], row["estimator"]) for row in _usable(rows))
+    return max(kinds, key=lambda pair: (kinds[pair], pair)) if kinds else None
+
+
+def _usable(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    usable = [row for row in rows if row["low"] is not None and not row["superseded"] and row["converged"]]
+    return [row for row in usable if row["parameter"] in HULL_PARAMETERS]
 
 
 def _x(at: int, first: int, last: int) -> float:

@@ -8,6 +8,7 @@ import numpy as np
 from markupsafe import Markup
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.workbench.web.data.signs import STARBOARD
 from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.shades import shades
@@ -20,9 +21,9 @@ _DEG = 180.0 / np.pi
 Line = tuple[Float, str]
 #: column, words, factor to the unit shown
 _SHOWN = (
-    ("yaw_rate", "rad_s", "yaw rate, deg/s", _DEG),
+    ("yaw_rate", "rad_s", f"yaw rate, deg/s ({STARBOARD})", _DEG),
     ("heading", "rad", "heading, deg", _DEG),
-    ("lateral_speed", "m_s", "lateral speed, m/s", 1.0),
+    ("lateral_speed", "m_s", f"lateral speed, m/s ({STARBOARD})", 1.0),
 )
 
 
@@ -102,8 +103,8 @@ def _figure(
     """Draw the rudder and below it every panel whose first line was measured."""
     end = float(time[-1])
     shown = [(words, lines) for words, lines in panels if np.isfinite(lines[0][0]).any()]
-    parts, top = [], 0.0
-    for words, lines in (("rudder, deg", [(_DEG * rudder_rad, "rudder")]), *shown):
+    parts, top = [], _GAP - 4.0
+    for words, lines in ((f"rudder, deg ({STARBOARD})", [(_DEG * rudder_rad, "rudder")]), *shown):
         if marked is not None:
             parts += shades(time, marked, _LEFT, (_WIDTH - _LEFT - 12.0) / max(end, 1e-9), top, _PANEL)
         parts += _panel(top, words, time, end, lines)
@@ -145,5 +146,5 @@ def _panel(top: float, words: str, time: Float, end: float, lines: Sequence[Line
             path = "M" + " ".join(f"{a:.1f} {b:.1f}" for a, b in places) if places else ""
         if path:
             parts.append(element("path", d=path, fill="none", class_=f"line-{kind}"))
-    parts.append(element("text", words, x=_LEFT + 6.0, y=top + 13.0, class_="label strong"))
+    parts.append(element("text", words, x=_LEFT, y=top - 5.0, class_="label strong"))
     return parts

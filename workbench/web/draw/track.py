@@ -45,7 +45,9 @@ def draw_track(channels: Instruments, manoeuvres: Sequence[tuple[int, int]]) -> 
         if last - first > 1:
             thick.append(_line(x[first:last], y[first:last], "track-manoeuvre"))
     begin = element("circle", cx=float(x[0]), cy=float(y[0]), r=4, class_="track-start")
-    return drawing(_WIDTH, _HEIGHT, "Track, north up", _line(x, y, "track"), *thick, begin, *_bar(scale), *_north())
+    return drawing(
+        _WIDTH, _HEIGHT, "Track, north up", _line(x, y, "track"), *thick, begin, *_bar(scale), *_north(), kind="map"
+    )
 
 
 def _line(x: Float, y: Float, kind: str) -> Markup:

@@ -9,9 +9,10 @@ from kempf.warehouse import history, notes
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.draw.history import draw_history
+from kempf.workbench.web.draw.history import draw_history, shown_kind
 from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
+from kempf.workbench.web.wording import estimator as estimator_words
 
 
 def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
@@ -36,12 +37,24 @@ def content(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any
     then = end_of(reply.arguments["as_of"], "as_of") if reply.arguments["as_of"] else None
     of = history.of_vessel(desk.warehouse, vessel, as_of=then)
     kinds = [] if reply.document is None else reply.document["changes"]
+    rows = of.rows()
+    shown = shown_kind(rows)
     return {
         "vessel": vessel,
         "as_of": reply.arguments["as_of"],
         "nothing": of.note,
-        "drawn": draw_history(of.rows(), kinds, notes.of_vessel(desk.warehouse, vessel, then)),
+        "drawn": draw_history(rows, kinds, notes.of_vessel(desk.warehouse, vessel, then)),
+        "drawn_model": None if shown is None else shown[0],
+        "drawn_words": None if shown is None else _said_of_figure(*shown),
         "made": reply.document,
         "tested": [kind for kind in kinds if kind["sets"]],
         "job": reply.waiting,
     }
+
+
+def _said_of_figure(model: str, estimator: str) -> str:
+    """Say what the figure of the parameters shows: of all models and estimators the one that most sets are of."""
+    return (
+        f"Dots: parameter sets of the model {model.replace('_', ' ')}, {estimator_words(estimator)}; lines: their "
+        "95 % intervals."
+    )

@@ -7,6 +7,7 @@ from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs.chosen_set import named_set
+from kempf.flows.jobs.leg_fit import by_name
 from kempf.flows.jobs.out_of_date import said_of_sets
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.parameter_set import ParameterSet
@@ -42,6 +43,8 @@ def gather(desk: Desk, a: str, b: str) -> Page:
         "rows": rows,
         "scaled": _rows(scaled),
         "drawn": draw_differences(_rows(scaled) or rows),
+        # which of them predictions do not take as they are shown here
+        "by_likelihood": [each.parameter_set_id for each in (first, second) if by_name(each)],
         "stale": said_of_sets(desk.warehouse, [first, second]),
         "inputs": list(_inputs(first, second)),
         "same_vessel": same_vessel,

@@ -7,6 +7,7 @@ from typing import Any
 from kempf.flows.jobs.standing_model import current_effects
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, diagnoses
+from kempf.workbench.rungs import first_model
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.ladder import draw_ladder
@@ -26,7 +27,7 @@ def document(desk: Desk, diagnosis_id: str) -> dict[str, Any]:
         raise NotFound(
             "no_diagnosis",
             f"No diagnosis has the id {diagnosis_id[:40]!r}.",
-            "A vessel's page lists her diagnoses; `kempf diagnose --vessel NAME` makes one.",
+            "A vessel's page lists her diagnoses, and makes one.",
         )
     return diagnosis.show()
 
@@ -41,6 +42,7 @@ def gather(desk: Desk, diagnosis_id: str) -> Page:
         "one": diagnosis,
         "ranked": [c for c in ranked if c["score"] is not None],
         "untestable": [c for c in ranked if c["score"] is None],
+        "first_model": first_model(diagnosis["ladder"][0]),
         "ladder": draw_ladder(diagnosis["ladder"]),
         "standing": aliases.of_vessel(desk.warehouse, vessel).get(aliases.CURRENT, ""),
         # what her current model has of each set by now

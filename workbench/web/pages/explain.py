@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from typing import Any
 
+from kempf.schemas.effects import catalogue
+from kempf.warehouse import vessels
+from kempf.workbench.rungs import sized
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages.answer import answer
@@ -32,6 +36,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     """
     reply = answer(desk, "explain", vessel, fields)
     effects = reply.document["effects"] if reply.document is not None else []
+    length_m = vessels.profiles(desk.warehouse)[vessel].length_m
     content = {
         "vessel": vessel,
         "asked": {
@@ -40,7 +45,30 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         },
         "made": reply.document,
         "scored": [effect for effect in effects if effect["score"] is not None],
+        "sizes": {effect["effect"]: sizes_of(effect, length_m) for effect in effects},
         "untestable": [effect for effect in effects if effect["score"] is None],
         "job": reply.waiting,
     }
     return Page("explain.html", "Explain a stretch", content, ((vessel, of_vessel(vessel)),))
+
+
+def sizes_of(effect: Mapping[str, Any], length_m: float | None) -> str:
+    """Return the sizes that a stretch gives an effect, those marked that no ship has; what was held has no error.
+
+    Parameters
+    ----------
+    length_m : float or None
+        Of the ship, beyond which nothing on board of her is; None where it is not known.
+    """
+    known = catalogue().get(effect["effect"])
+    bounds = {p.name: (p.low, p.high) for p in known.parameters} if known is not None else {}
+    sizes = []
+    for name, size in effect["size"].items():
+        if size["unit"] == "m" and length_m is not None:
+            bounds[name] = (-length_m, length_m)
+        words = sized(name, size["value"], size["std"], size["unit"])
+        if size["std"] is None:
+            words = words.replace(" ± -", "") + " (held)"
+        low, high = bounds.get(name, (-inf, inf))
+        sizes.append(words if low <= size["value"] <= high else f"{words} (beyond what is physical)")
+    return ", ".join(sizes)

@@ -12,7 +12,7 @@ from kempf.flows.jobs.standing_model import require_current
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import vessels
+from kempf.warehouse import segments, vessels
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
@@ -21,6 +21,7 @@ from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, DONE, FAILED, QUEUED, Job
+from kempf.workbench.web.pages.manoeuvre_names import kind_and_side
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.window import instant
 
@@ -60,9 +61,17 @@ def gather(desk: Desk, name: str) -> Page:
     waiting = [one.id for one in desk.queue.active()]
     content["before"] = waiting.index(job.id) if job.state == QUEUED and job.id in waiting else 0
     vessel = job.arguments["vessel"]
+    if job.kind == "ingest" and job.result is not None:
+        content["names"] = _names_of_found(desk, job.result["outcomes"])
     return Page(
         "job.html", f"{KINDS[job.kind].title}: {vessel}", content, (("Jobs", "/jobs"), (vessel, of_vessel(vessel)))
     )
+
+
+def _names_of_found(desk: Desk, outcomes: list[dict[str, Any]]) -> dict[str, str]:
+    """Return what the manoeuvres that a job found are called, by id; of those that are no more there is none."""
+    ingests = [one["ingest_id"] for one in outcomes if one.get("ingest_id")]
+    return {one.segment_id: kind_and_side(one) for one in segments.of_ingests(desk.warehouse, ingests)}
 
 
 def ask(desk: Desk, form: Mapping[str, str]) -> Job:

@@ -15,6 +15,7 @@ from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.draw.strip import Strips, draw_strips
+from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 #: stretches shown, and manoeuvres with a strip of what is left
@@ -65,7 +66,13 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         mark = _marked(evidence, fields.get("mark"))
         shown = _shown(runs, prediction, mark, fields.get("run"))
         before = prediction_before.columns.get(shown["segment_id"]) if prediction_before else None
+        summaries = [prediction.document["summary"][key] for key, _ in SAMPLES if prediction.document["summary"][key]]
+        units = {channel: one["unit"] for summary in summaries for channel, one in summary["rms_display"].items()}
         content |= {
+            "names": names_of(desk.warehouse, vessel),
+            "short": names_of(desk.warehouse, vessel, when=False),
+            "rms_channels": list(units),
+            "rms_units": [(channel.replace("_", " "), unit) for channel, unit in units.items()],
             "runs": runs,
             "shown": shown,
             "drawn": draw_run(

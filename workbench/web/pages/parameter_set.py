@@ -11,6 +11,7 @@ from kempf.warehouse import history
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.correlation import draw_correlation
+from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
@@ -25,6 +26,7 @@ def gather(desk: Desk, set_id: str) -> Page:
     unseen = parameter_set.unseen
     content = {
         "one": parameter_set.show(),
+        "names": names_of(desk.warehouse, parameter_set.vessel),
         "fitted": [name for name in parameter_set.segment_ids if name not in unseen],
         "held_out": list(parameter_set.convergence.get("held_out") or ()),
         "by_legs": by_name(parameter_set),

@@ -12,6 +12,7 @@ from kempf.workbench.web.data.sailed import MANOEUVRES
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.sailed import draw_sailed
 from kempf.workbench.web.pages.answer import answer
+from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
@@ -41,6 +42,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         prediction = reply.made["document"]
         content |= {
             "drawn": draw_sailed(prediction["manoeuvre"], reply.made["curves"]),
+            "names": names_of(desk.warehouse, vessel),
             "rows": list(_rows(prediction)),
             "measured": list(_measured(prediction)),
             "last_turn": LAST_TURN if prediction["manoeuvre"]["kind"] == "turning-circle" else None,

@@ -16,6 +16,7 @@ from kempf.warehouse import logs, segments
 from kempf.workbench.web.data.bins import Shown, reduced
 from kempf.workbench.web.data.frames import encoded
 from kempf.workbench.web.data.predictions import UNITS, kept_of
+from kempf.workbench.web.data.signs import SIGNS
 from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.window import window
@@ -120,10 +121,12 @@ def offered(instruments: Instruments) -> list[dict[str, Any]]:
 def entry(name: str, source: str, *, shown: bool) -> dict[str, Any]:
     """Return a channel as a chart offers it."""
     channel = CHANNELS[name]
-    return {"name": name, "unit": channel.unit, "words": channel.words, "source": source, "shown": shown}
+    sign = SIGNS.get(name, "")
+    return {"name": name, "unit": channel.unit, "sign": sign, "words": channel.words, "source": source, "shown": shown}
 
 
 def derived() -> dict[str, Any]:
     """Return the lateral speed as a channel that a chart can show beside those of a log."""
     words = "lateral speed through the water from GNSS and heading, eq. (18) of the paper"
-    return {"name": LATERAL, "unit": "m/s", "words": words, "source": "GNSS", "shown": True, "derived": True}
+    own = {"name": LATERAL, "unit": "m/s", "sign": SIGNS[LATERAL], "words": words, "source": "GNSS"}
+    return {**own, "shown": True, "derived": True}

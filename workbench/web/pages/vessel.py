@@ -13,6 +13,7 @@ from kempf.workbench.documents.parameter_sets import listed_sets
 from kempf.workbench.documents.vessel import vessel_document
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages import changes, jobs
+from kempf.workbench.web.pages.manoeuvre_names import logs_begin_alike
 from kempf.workbench.web.pages.page import Page
 
 #: entries of a list that the page shows
@@ -29,13 +30,14 @@ def gather(desk: Desk, vessel: str) -> Page:
     warehouse = desk.warehouse
     sets = listed_sets(warehouse, vessel)
     standing = set(history.standing(warehouse, vessel))
+    manoeuvres = listed_manoeuvres(warehouse, vessel).documents
     over_time = changes.content(desk, vessel, {}) if sets else {}
     content = {
         "vessel": vessel,
         "profile": document(desk, vessel)["profile"],
         "lists": _newest(
             logs=listed_logs(warehouse, vessel).documents,
-            manoeuvres=listed_manoeuvres(warehouse, vessel).documents,
+            manoeuvres=manoeuvres,
             sets=[{**row, "standing": row["parameter_set_id"] in standing} for row in sets],
         ),
         "diagnoses": [diagnosis.show() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
@@ -45,6 +47,16 @@ def gather(desk: Desk, vessel: str) -> Page:
         "jobs": jobs.rows([job for job in desk.queue.active() if job.arguments["vessel"] == vessel]),
         "stale": said_of_vessel(warehouse, vessel),
         "history": over_time.get("drawn"),
+        "history_words": over_time.get("drawn_words"),
+        "other_current": next(
+            (
+                row["parameter_set_id"]
+                for row in sets
+                if "current" in row["aliases"] and row["model_name"] != over_time.get("drawn_model")
+            ),
+            None,
+        ),
+        "alike": logs_begin_alike((str(one["start"]), str(one["log"])) for one in manoeuvres),
         "tested": over_time.get("tested"),
     }
     return Page("vessel.html", vessel, content)

@@ -11,6 +11,7 @@ from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.what_if import draw_what_if
 from kempf.workbench.web.pages.answer import Answer, answer
+from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
@@ -28,17 +29,19 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         ``parameter``, ``set``, ``segment``, any of them.
     """
     parameter_set, reply = _asked_for(desk, vessel, fields)
+    names = names_of(desk.warehouse, vessel)
     content: dict[str, Any] = {
         "vessel": vessel,
         "asked": reply.arguments,
         "parameters": [p.name for p in parameter_set.parameters],
-        "segments": list(parameter_set.segment_ids),
+        "segments": [(one, names.get(one, one)) for one in parameter_set.segment_ids],
         "made": reply.document,
         "job": reply.waiting,
     }
     if reply.made is not None:
         outcome = reply.made["document"]
         content |= {
+            "name": names.get(outcome["segment_id"], outcome["segment_id"]),
             "drawn": draw_what_if(reply.made["series"]),
             "middle": min(
                 range(len(outcome["tried"])), key=lambda k: abs(outcome["tried"][k]["value"] - outcome["value"])

@@ -4,6 +4,8 @@
 (() => {
   const SHIP = { "rad": [180 / Math.PI, "deg"], "rad/s": [180 / Math.PI, "deg/s"], "m/s": [3600 / 1852, "kn"], "1/s": [60, "rpm"] };
   const SMALLEST_S = 0.05;
+  // room above the first panel, where the manoeuvres have their names
+  const NAMES = 18;
   const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
   const seconds = iso => Date.parse(iso) / 1000;
   // to the millisecond: an address is read by people
@@ -144,12 +146,17 @@
       return this.si ? [1, unit] : SHIP[unit] || [1, unit];
     }
 
+    sign(name) {
+      const sign = this.boxes.find(box => box.value === name).dataset.sign;
+      return sign ? ` (${sign})` : "";
+    }
+
     draw() {
       for (const plot of this.plots) plot.destroy();
       this.plots = [];
       this.panels.replaceChildren();
       const panels = this.boxes.map(box => this.series.filter(one => one.panel === box.value)).filter(found => found.length);
-      panels.forEach((found, k) => this.panel(found, k === panels.length - 1));
+      panels.forEach((found, k) => this.panel(found, k === 0, k === panels.length - 1));
       const reduced = this.series.filter(one => one.total >= 1.5 * one.drawn).map(one => `1 of ${Math.round(one.total / one.drawn)} of ${named(one)}`);
       this.state.textContent = `${iso(this.span[0]).replace("T", " ")} to ${iso(this.span[1]).slice(11)}: ${panels.length} channels` + (reduced.length ? `; shown: ${reduced.join(", ")} (smallest and largest of each stretch)` : "");
       this.node.querySelector("[data-do=units]").textContent = this.si ? "Units: SI" : "Units: deg, kn";
@@ -157,8 +164,8 @@
       document.body.dataset.ready = "yes";
     }
 
-    panel(found, last) {
-      const [factor, unit] = this.unit(found[0].panel), words = found[0].panel.replaceAll("_", " "), label = unit === "1" ? words : `${words}, ${unit}`;
+    panel(found, top, last) {
+      const [factor, unit] = this.unit(found[0].panel), words = found[0].panel.replaceAll("_", " "), label = (unit === "1" ? words : `${words}, ${unit}`) + this.sign(found[0].panel);
       const y = found.map(one => one.y.map(v => v === null ? null : v * factor)), known = y.flat().filter(v => v !== null), total = found.reduce((sum, one) => sum + one.total, 0);
       const holder = document.createElement("div");
       holder.className = "panel";
@@ -173,7 +180,7 @@
       const time = last ? { ...axis, values: clock, space: 80 } : { ...axis, values: (u, splits) => splits.map(() => ""), size: 8, space: 80 };
       const drawn = found.map(one => ({ label: found.length > 1 ? `${label}, ${one.kind}` : label, value: (_, v) => short(v), ...style(one, found.length > 1) }));
       const plot = new uPlot({
-        width: Math.max(200, this.panels.clientWidth), height: last ? 150 : 124, tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
+        width: Math.max(200, this.panels.clientWidth), height: (last ? 150 : 124) + (top ? NAMES : 0), padding: [top ? NAMES : null, null, null, null], tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
         scales: { x: { time: true, range: () => this.span } },
         axes: [time, { ...axis, size: 64, space: 24 }],
         series: [{ label: "UTC", value: (_, s) => s === null || s === undefined ? "-" : iso(s).slice(11, 23) }, ...drawn],
@@ -204,22 +211,47 @@
       context.beginPath();
       context.rect(left, top, width, height);
       context.clip();
+      this.letters(context);
+      draw(context, left, top, width, height, this.first(u));
+      context.restore();
+    }
+
+    first(u) { return u === this.plots[0] || this.plots.length === 0; }
+
+    // uPlot leaves the alignment of its axes behind
+    letters(context) {
       context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-      draw(context, left, top, width, height, u === this.plots[0] || this.plots.length === 0);
+      context.textAlign = "left";
+      context.textBaseline = "alphabetic";
+      context.fillStyle = colour("--ink");
+    }
+
+    // above the first panel, where no trace is: a name whole, else its first word, else none; none over the next one
+    names(u) {
+      const context = u.ctx, { left, top, width } = u.bbox, room = 4 * devicePixelRatio;
+      const shown = this.spans.filter(span => span.kind !== "note").map(one => ({
+        words: one.words, from: Math.max(left, u.valToPos(one.from, "x", true)), to: Math.min(left + width, u.valToPos(one.to, "x", true)),
+      })).filter(one => one.to > one.from).sort((a, b) => a.from - b.from);
+      context.save();
+      this.letters(context);
+      shown.forEach((one, k) => {
+        const end = Math.max(one.to, k + 1 < shown.length ? shown[k + 1].from - room : left + width);
+        const words = [one.words, one.words.split(" ")[0]].find(some => one.from + context.measureText(some).width <= end);
+        if (words) context.fillText(words, one.from, top - 5 * devicePixelRatio);
+      });
       context.restore();
     }
 
     // behind the channels: manoeuvres, and what of the log is lost
     shade(u) {
-      this.inside(u, (context, left, top, width, height, first) => {
+      if (this.first(u)) this.names(u);
+      this.inside(u, (context, left, top, width, height) => {
         for (const one of this.spans.filter(span => span.kind !== "note")) {
           const a = u.valToPos(one.from, "x", true), b = u.valToPos(one.to, "x", true);
           if (a > left + width || b < left) continue;
           context.setLineDash([]);
           if (one.kind === "lost") this.hatch(context, Math.max(a, left), Math.min(b, left + width), top, height);
           else { context.fillStyle = colour("--band"); context.fillRect(a, top, b - a, height); }
-          context.fillStyle = colour("--ink");
-          if (first) context.fillText(one.words, Math.max(a, left) + 4, top + 13 * devicePixelRatio);
           context.strokeStyle = colour("--plain");
           context.setLineDash([4, 4]);
           for (const execute of one.executes) this.upright(context, u.valToPos(execute, "x", true), top, height);
@@ -238,9 +270,11 @@
           context.setLineDash([2, 2]);
           if (!before) this.upright(context, at, top, height);
           if (!first) return;
-          const x = Math.max(at, left) + 4, y = top + height - line * (row % 4 + 1.3);
+          const wide = context.measureText(words).width, right = Math.max(at, left) + 4;
+          // to the left of its line where there is no room to the right
+          const x = right + wide <= left + width ? right : Math.max(left + 2, at - 4 - wide), y = top + height - line * (row % 4 + 1.3);
           context.fillStyle = colour("--page");
-          context.fillRect(x - 2, y - line + 3, context.measureText(words).width + 4, line);
+          context.fillRect(x - 2, y - line + 3, wide + 4, line);
           context.fillStyle = colour("--ink");
           context.fillText(words, x, y);
         });

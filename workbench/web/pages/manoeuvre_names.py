@@ -1,0 +1,46 @@
+"""What a person calls a vessel's manoeuvres: kind and side, when, and the log where several begin alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from kempf.warehouse import logs, segments
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+
+def kind_and_side(segment: Segment) -> str:
+    """Return a manoeuvre without its time: ``20/20 zigzag to starboard``."""
+    return segment.words + (f" to {segment.first_side}" if segment.first_side in ("starboard", "port") else "")
+
+
+def names_of(warehouse: Warehouse, vessel: str, *, when: bool = True) -> dict[str, str]:
+    """Return the name of every manoeuvre of a vessel by its id.
+
+    Parameters
+    ----------
+    when : bool, optional
+        Whether the name has the beginning; the log stands in it where those of several logs begin alike.
+    """
+    found = segments.found_in(warehouse, vessel)
+    files = {row.ingest_id: row.file_name for row in logs.current(warehouse, vessel)}
+    alike = logs_begin_alike((iso_utc(one.start_utc_ns), one.ingest_id) for one in found)
+    return {
+        one.segment_id: kind_and_side(one)
+        + (f", {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')}" if when else "")
+        + (f", {files[one.ingest_id]}" if alike and one.ingest_id in files else "")
+        for one in found
+    }
+
+
+def logs_begin_alike(manoeuvres: Iterable[tuple[str, str]]) -> bool:
+    """Return whether manoeuvres of several logs begin in the same minute, as where a logger has no calendar.
+
+    Parameters
+    ----------
+    manoeuvres : iterable of (str, str)
+        Start, ISO 8601, and log of each.
+    """
+    log_at: dict[str, str] = {}
+    return any(log_at.setdefault(start[:16], log) != log for start, log in manoeuvres)
