@@ -53,7 +53,7 @@ def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
     tab.wait_for_selector("body[data-ready=yes]")
     assert re.search(r"/segments/seg-\w+\?from=20.*&to=20.*&worst=1", tab.url)
     assert "1 of the" in tab.inner_text("main")
-    assert tab.query_selector(".panel[aria-label^='yaw rate, deg/s (measured, predicted)']") is not None
+    assert tab.query_selector(".panel[aria-label^='yaw rate, deg/s (starboard +) (measured, predicted)']") is not None
     accessible(tab)
     tab.keyboard.press("n")
     tab.wait_for_url("**&worst=2")
@@ -64,7 +64,7 @@ def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
     tab.wait_for_url("**/jobs/job-**")
     tab.reload()  # in the middle of it
     tab.wait_for_url("**/diagnoses/dx-**")
-    assert "rudder_lag" in tab.inner_text("main")
+    assert "+ rudder lag" in tab.inner_text("main")
     found = tab.url
     reach(tab, "button:has-text('Add rudder lag')")
     tab.wait_for_url("**/ladder")
@@ -101,7 +101,7 @@ def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
     # the address of the diagnosis, opened by somebody who may only read: no button
     other = opened(browser, server)
     other.goto(found)
-    assert "rudder_lag" in other.inner_text("main") and other.query_selector("main button") is None
+    assert "+ rudder lag" in other.inner_text("main") and other.query_selector("main button") is None
     assert server.complaints == []
 
 
