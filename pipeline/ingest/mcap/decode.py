@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import TypeVar
 
 import numpy as np
@@ -11,10 +12,17 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.arrivals import Arrived, by_source
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.clocks import put_right
+from kempf.pipeline.ingest.mcap.corrected import Corrected
+from kempf.pipeline.ingest.mcap.fields_seen import FieldsSeen
+from kempf.pipeline.ingest.mcap.own_stamps import OwnStamps
+from kempf.pipeline.ingest.mcap.publishers import Publishers
+from kempf.pipeline.ingest.mcap.recorder_time import TIMES, RecorderTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
 from kempf.pipeline.ingest.mcap.stream import McapStream
-from kempf.pipeline.ingest.mcap.topics import Route
+from kempf.pipeline.ingest.mcap.topics import DecodedTopics, Route
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError
@@ -22,8 +30,6 @@ from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
 from kempf.schemas.profile import ChannelMap, Source
 
 T = TypeVar("T", bound=np.generic)
-
-_TIMES = ("log_time", "publish_time")
 
 #: Topics that are named in a message to a person, at most.
 _NAMED = 20
@@ -45,30 +51,40 @@ class Part:
     text: NDArray[np.bool_]
     #: By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
     values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
+    #: Number of the first record in the file.
+    first: int = 0
+    #: Good messages of the channels that are read, for the questions of clocks; empty where these are settled.
+    arrived: list[Arrived] = field(default_factory=list)
+    #: Numbers of records within the part, of the channels that share their topic with another one.
+    shared: list[tuple[int, str, NDArray[np.int64]]] = field(default_factory=list)
 
 
 _NO_BATCH = joined([])
 
 #: Messages that are checked and handed on together.
 _TOGETHER = 1 << 16
+#: Messages by which it is judged whether the times of a log can be believed; if not, it is read through for them first.
+_SAMPLE = 1 << 16
 
 
 class _Waiting:
     """Parts that become one."""
 
     def __init__(self) -> None:
-        self._places, self._parts = PayloadsBuilder(), list[Part]()
+        self._places, self.parts = PayloadsBuilder(), list[Part]()
         self.size = 0
+        #: Whether nothing of the file follows.
+        self.ends = False
 
     def add(self, part: Part) -> None:
         """Take one more; of its bytes only where they stand."""
         self._places.add(part.batch)
-        self._parts.append(replace(part, batch=_NO_BATCH))
+        self.parts.append(replace(part, batch=_NO_BATCH))
         self.size += part.time_ns.size
 
     def decoded(self, log: LogFile, first: int, topics: tuple[str, ...]) -> Decoded:
         """Return them as one, the first record of which has the number ``first``; more of the log follows."""
-        parts = self._parts
+        parts = self.parts
         payloads = self._places.build(log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
         return Decoded(
             np.arange(first, first + self.size, dtype=np.int64),
@@ -162,13 +178,16 @@ class _DecodeJob:
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
         time = source.time if source else None
-        self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
-        self.time_field = time if time and time.column and time.column not in _TIMES else None
+        self.recorder = RecorderTime(time)
+        self.time_field = time if time and time.column and time.column not in TIMES else None
         self.routes: dict[int, Route | None] = {}
         self.made: dict[McapChannel, Route | None] = {}
         self.refused: dict[str, str] = {}
-        self.seen: dict[str, set[str]] = {}
+        self.fields = FieldsSeen()
         self.timed, self.untimed = False, set[str]()
+        self.own_stamps, self.publishers = OwnStamps(), Publishers()
+        self.numbers: dict[str, set[int]] = {}
+        self.corrected, self.records, self.settled = Corrected({}), dict[str, NDArray[np.int64]](), False
         self.places: dict[str, int] = {}
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
@@ -185,26 +204,79 @@ class _DecodeJob:
 
     def run(self, patterns: list[str]) -> Iterator[Decoded]:
         """Read the file through."""
-        first, waiting = 0, _Waiting()
-        for part in self.parts():
-            waiting.add(part)
-            if waiting.size >= _TOGETHER:
-                yield waiting.decoded(self.log, first, tuple(self.places))
-                first, waiting = first + waiting.size, _Waiting()
-        self.require_something(patterns)
-        last = waiting.decoded(self.log, first, tuple(self.places))
-        yield replace(last, notes=[*self.stream.notes, *self._notes()], lost=tuple(self.stream.lost), ends=True)
+        first, groups, sample = 0, self._groups(), list[_Waiting]()
+        for group in groups:
+            sample.append(group)
+            if sum(own.size for own in sample) >= _SAMPLE:
+                break
+        self._settle_clocks(sample)
+        for group in chain(sample, groups):
+            self._correct(group)
+            decoded = group.decoded(self.log, first, tuple(self.places))
+            first += group.size
+            if not group.ends:
+                yield decoded
+                continue
+            self.require_something(patterns)
+            notes = [*self.stream.notes, *self.recorder.notes, *self.corrected.notes, *self._notes()]
+            yield replace(decoded, notes=notes, lost=tuple(self.stream.lost), ends=True)
 
     def parts(self) -> Iterator[Part]:
         """Read the file a few megabytes at a time; no more than that is held."""
+        first = 0
         for batch in self.stream.batches():
-            yield self._part(batch)
+            yield self._part(batch, first)
+            first += batch.first.size
 
-    def _part(self, batch: Batch) -> Part:
+    def _groups(self) -> Iterator[_Waiting]:
+        """Read the file some ten thousand messages at a time, the last of them perhaps none."""
+        waiting = _Waiting()
+        for part in self.parts():
+            waiting.add(part)
+            if waiting.size >= _TOGETHER:
+                yield waiting
+                waiting = _Waiting()
+        waiting.ends = True
+        yield waiting
+
+    def _settle_clocks(self, sample: list[_Waiting]) -> None:
+        """Judge the times of the first messages, and if they cannot be believed, those of all."""
+        arrived = [one for group in sample for part in group.parts for one in part.arrived]
+        corrected = self._put_right(arrived)
+        ends = sample[-1].ends
+        if not ends and (corrected.times_ns or corrected.notes):
+            whole = _DecodeJob(self.name, self.log, self.source)
+            arrived = [one for part in whole.parts() for one in part.arrived]
+            corrected = self._put_right(arrived)
+        self.corrected, self.settled = corrected, True
+        sources = by_source(arrived, self._source_of) if corrected.times_ns else []
+        self.records = {own.source: own.record for own in sources if own.source in corrected.times_ns}
+
+    def _put_right(self, arrived: list[Arrived]) -> Corrected:
+        self.publishers.decide(arrived)
+        return put_right(by_source(arrived, self._source_of), stamps_count=self.time_field is not None)
+
+    def _source_of(self, one: Arrived) -> str:
+        return self.publishers.source(one.channel, one.topic)
+
+    def _correct(self, group: _Waiting) -> None:
+        """Give records the times that were put right, and those of a second publisher a source of their own."""
+        for part in group.parts:
+            for one in part.arrived:
+                source = self._source_of(one)
+                if source in self.records:
+                    at = np.searchsorted(self.records[source], one.record)
+                    part.time_ns[one.record - part.first] = self.corrected.times_ns[source][at]
+            for number, topic, record in part.shared:
+                source = self.publishers.source(number, topic)
+                if source != topic:
+                    part.topic[record] = self.places.setdefault(source, len(self.places))
+
+    def _part(self, batch: Batch, first: int) -> Part:
         n = batch.first.size
-        time = (batch.log_time if self.clock == _TIMES[0] else batch.publish_time).copy()
+        time = self.recorder.of(batch)
         topic, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.bool_)
-        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {})
+        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {}, first)
         for number, record in _by_channel(batch.channel):
             channel = self.stream.channels.get(number)
             if channel is None:
@@ -217,13 +289,16 @@ class _DecodeJob:
             elif (route := self._route(number, channel)) is None:
                 part.reason[record] = CODE[Reason.NO_CHANNEL]
             else:
-                self._read(part, record, channel.topic, route)
+                self._read(part, record, number, channel, route)
+        self.fields.end_part()
         return part
 
-    def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
+    def _read(self, part: Part, record: NDArray[np.int64], number: int, channel: McapChannel, route: Route) -> None:
         """Decode the messages of one channel."""
-        batch = part.batch
-        decoded = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        batch, topic = part.batch, channel.topic
+        payloads = Spans(batch.content, batch.first[record], batch.end[record])
+        decoded = route.read(payloads)
+        self._note_arrival(part, record, number, channel, decoded, payloads)
         part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
         if decoded.time_ns is not None:
             timed = decoded.time_ns >= 0
@@ -231,12 +306,53 @@ class _DecodeJob:
             part.time_ns[record[timed]] = decoded.time_ns[timed]
             if not timed[decoded.good].all():
                 self.untimed.add(topic)
+        good = np.flatnonzero(decoded.good)
+        whole = payloads.take(good)
         for key, (value, present) in decoded.values.items():
             mapped = route.mapped[key]
+            self.fields.add(
+                key,
+                record[good],
+                present[good],
+                part.time_ns[record[good]],
+                whole,
+                channel,
+                self.stream.schemas.get(channel.schema),
+            )
             if present.any():
-                self.seen.setdefault(topic, set()).add(key)
                 samples = record[present], value[present] * mapped.factor + mapped.offset_si
                 part.values.setdefault(mapped.channel, []).append(samples)
+
+    def _note_arrival(
+        self,
+        part: Part,
+        record: NDArray[np.int64],
+        number: int,
+        channel: McapChannel,
+        decoded: DecodedTopics,
+        payloads: Spans,
+    ) -> None:
+        """Keep what the questions of clocks ask for, as long as they are open or the answer has to be applied."""
+        numbers = self.numbers.setdefault(channel.topic, set())
+        numbers.add(number)
+        if len(numbers) > 1:
+            part.shared.append((number, channel.topic, record))
+        if self.settled and not self.records and len(numbers) == 1:
+            return
+        good = decoded.good
+        stamp, value = np.full(record.size, NO_TIME), np.full(record.size, np.nan)
+        if decoded.time_ns is not None:
+            stamp = np.where(decoded.time_ns >= 0, decoded.time_ns, NO_TIME)
+        elif not self.settled:
+            stamp = self.own_stamps.read(channel, self.stream.schemas.get(channel.schema), payloads)
+        for own, present in decoded.values.values():
+            value = np.where(present, own, np.nan)
+            break
+        part.arrived.append(
+            Arrived(
+                number, channel.topic, part.first + record[good], part.time_ns[record[good]], stamp[good], value[good]
+            )
+        )
 
     def _route(self, number: int, channel: McapChannel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
@@ -272,7 +388,9 @@ class _DecodeJob:
 
     def _refuse_late_owner(self, before: dict[str, tuple[str, str]], topic: str) -> None:
         """Refuse a file whose summary leaves out a topic to which a key belongs that was read from another one."""
-        misread = [key for key, owner in before.items() if self.owners[key] != owner and owner[0] in self.seen]
+        misread = [
+            key for key, owner in before.items() if self.owners[key] != owner and owner[0] in self.fields.topics()
+        ]
         if misread:
             raise DataRejected(
                 "summary_incomplete",
@@ -291,17 +409,20 @@ class _DecodeJob:
         for number, route in self.routes.items():
             topic = self.stream.channels[number].topic
             for key in route.mapped if route else ():
-                if key not in self.seen.get(topic, ()):
+                if not self.fields.seen(topic, key):
                     why = route.absent.get(key) if route else None
                     absent[topic, key] = f"No message of {topic} has the field {key}{f': {why}' if why else ''}."
         notes += absent.values()
+        notes += self.fields.notes()
         assert self.time_field is not None or not self.untimed
         for topic in sorted(self.untimed):
             notes.append(
                 f"Messages of {topic} without {self.time_field.column if self.time_field else ''} have log time."
             )
+        notes += self.publishers.notes()
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
-        unmapped = sorted(set(self.places) - read - set(self.refused))
+        topics = {channel.topic for channel in self.stream.channels.values()}
+        unmapped = sorted((set(self.places) & topics) - read - set(self.refused))
         if unmapped:
             more = f" and {len(unmapped) - _NAMED} more" if len(unmapped) > _NAMED else ""
             notes.append(f"Topics without a channel: {', '.join(unmapped[:_NAMED])}{more}.")
@@ -327,7 +448,7 @@ class _DecodeJob:
             raise UsageError(
                 "no_time_column",
                 f"The source for {self.name} takes its time from {column!r}, which no message that it maps has; "
-                f"every MCAP message has {' and '.join(_TIMES)}.",
+                f"every MCAP message has {' and '.join(TIMES)}.",
                 "Name one of these or a field of the messages, such as header.stamp, as the column of 'time', "
                 "or leave 'time' out.",
                 {"name": self.name, "column": column},
