@@ -24,8 +24,9 @@ _FEWEST = 10
 _SILENT_NS, _UNUSUAL = SECOND_NS, 8
 #: Longer ones are noted as gaps of the log, ns.
 _GAP_NS = 10 * SECOND_NS
-#: How often topics come that come twice as often as usual, and seconds of a log in which that is looked for.
-_TWICE, _OFTEN = (1.5, 2.5), 30
+#: How often topics come that come twice as often as usual, seconds for which they do so at the least, and of a log in
+#: which that is looked for.
+_TWICE, _LASTING, _OFTEN = (1.5, 2.5), 2, 30
 #: Stamps of two topics show the same step within this, ns.
 _AGREE_NS = SECOND_NS // 10
 
@@ -99,7 +100,7 @@ def without_steps(topics: list[Arrivals]) -> Stepped:
 
 def _doubled(topics: list[Arrivals]) -> tuple[str, ...]:
     """Name a stretch in which every topic comes twice as often: a clock was set back, and the file sorted by it."""
-    if not topics:
+    if not topics or any(np.any(np.diff(topic.log_ns) < 0) for topic in topics):
         return ()
     start = min(int(topic.log_ns.min()) for topic in topics)
     seconds = (max(int(topic.log_ns.max()) for topic in topics) - start) // SECOND_NS + 1
@@ -111,7 +112,7 @@ def _doubled(topics: list[Arrivals]) -> tuple[str, ...]:
     ratio = counts / np.maximum(np.median(counts, axis=1, keepdims=True), 1)
     twice = (ratio.min(axis=0) >= _TWICE[0]) & (ratio.mean(axis=0) <= _TWICE[1])
     edges = np.flatnonzero(np.diff(np.concatenate(([False], twice, [False]))))
-    if edges.size != 2:
+    if edges.size != 2 or edges[1] - edges[0] < _LASTING:
         return ()
     first, behind = edges.tolist()
     around = ratio[:, [max(first - 2, 0), min(behind + 1, seconds - 1)]].mean(axis=0)

@@ -306,8 +306,8 @@ class _DecodeJob:
             part.time_ns[record[timed]] = decoded.time_ns[timed]
             if not timed[decoded.good].all():
                 self.untimed.add(topic)
-        good = np.flatnonzero(decoded.good)
-        whole = payloads.take(good)
+        good = np.flatnonzero(decoded.good) if not decoded.good.all() else slice(None)
+        whole = payloads.take(good) if not isinstance(good, slice) else payloads
         for key, (value, present) in decoded.values.items():
             mapped = route.mapped[key]
             self.fields.add(

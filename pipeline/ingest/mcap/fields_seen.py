@@ -95,10 +95,13 @@ class FieldsSeen:
         self._part.clear()
 
     def _count(self, ends: _Ends, fields: list[_Field]) -> None:
-        record = np.concatenate([one.record for one in fields])
-        order = np.argsort(record, kind="stable")
-        present = np.concatenate([one.present for one in fields])[order]
-        time = np.concatenate([one.time_ns for one in fields])[order]
+        if len(fields) == 1:
+            (one,) = fields
+            order, present, time = np.arange(one.record.size), one.present, one.time_ns
+        else:
+            order = np.argsort(np.concatenate([one.record for one in fields]), kind="stable")
+            present = np.concatenate([one.present for one in fields])[order]
+            time = np.concatenate([one.time_ns for one in fields])[order]
         (given,) = np.nonzero(present)
         if not ends.messages and not present[0]:
             ends.first = _numbers(fields, int(order[0]))
