@@ -135,6 +135,28 @@ def test_pairs_of_two_devices_and_repetitions_are_no_bursts() -> None:
     assert readings.notes == () and times(readings, "/rudder")[1] == START + 1_000_000
 
 
+def test_a_rudder_that_speaks_when_it_moves_has_no_bursts() -> None:
+    log = [
+        (START + round((k * 4.0 + 0.01 * n) * 1e9), "/rudder", {"angle": 0.3 * n * (-1) ** k}, 0)
+        for k in range(40)
+        for n in range(12)
+    ]
+    given = profile(channels={"/rudder.angle": {"channel": "rudder_angle", "unit": "deg"}})
+    readings = read(write(log), given)
+    assert readings.notes == () and times(readings, "/rudder")[1] == START + 10_000_000
+
+
+def test_twin_rudders_that_follow_each_other_have_no_bursts() -> None:
+    draw, log = np.random.default_rng(5), []
+    for k in range(200):
+        for side in range(2):
+            angle = 20.0 * np.sin(k / 8) + draw.normal(0, 0.1)
+            log.append((START + k * SECOND // 2 + side * 500_000, "/rudder", {"angle": angle}, 0))
+    given = profile(channels={"/rudder.angle": {"channel": "rudder_angle", "unit": "deg"}})
+    readings = read(write(log), given)
+    assert readings.notes == () and times(readings, "/rudder")[1] == START + 500_000
+
+
 def test_messages_that_waited_are_read_at_their_stamps() -> None:
     log = stamped(moved(every(1.0), ["/gyro"]))
     readings = read(write(log))

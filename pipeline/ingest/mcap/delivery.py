@@ -27,9 +27,12 @@ _EVEN = 0.25
 _CLOSE = 0.3
 #: A burst lasts less than this share of the time since the one before.
 _BRIEF = 0.1
+#: Messages of a burst come within this of each other, ns, and bursts as regularly as by this share of their distance.
+_AT_ONCE_NS, _REGULAR = SECOND_NS // 200, 0.5
 #: Two readings of one burst repeat each other, or come from two devices, where so much more of them are equal than of
-#: those in two bursts, or where they step back so often.
-_REPEATS, _ALTERNATES = 0.3, -0.6
+#: those in two bursts, where they differ by less than this share of what those in two bursts do, or where they step
+#: back so often.
+_REPEATS, _NEAR, _ALTERNATES = 0.3, 0.5, -0.6
 #: Share of the messages of a topic that come with the bursts of others where it comes by the same way, and share of the
 #: time that these bursts take at most.
 _WITH, _OF_TIME = 0.9, 0.3
@@ -172,8 +175,11 @@ def _in_bursts(log_ns: Nanoseconds, value: Float) -> bool:
     first, last = _ends(log_ns)
     if first.size < _LEAST // 2:
         return False
-    between, lasting = np.median(np.diff(log_ns[first])), np.median(log_ns[last] - log_ns[first])
-    if between < _WORTH_NS or lasting > _BRIEF * between:
+    low, between, high = np.quantile(np.diff(log_ns[first]), (0.1, 0.5, 0.9))
+    lasting = np.median(log_ns[last] - log_ns[first])
+    # a topic that speaks when something moves has bursts too, but neither at once nor by a clock
+    at_once = np.median(np.diff(log_ns)[close]) <= _AT_ONCE_NS
+    if between < _WORTH_NS or lasting > _BRIEF * between or high - low > _REGULAR * between or not at_once:
         return False
     return not _at_one_instant(value, close)
 
@@ -192,6 +198,8 @@ def _at_one_instant(value: Float, close: Flag) -> bool:
     if there.size == 0 or not here.any():
         return True
     if np.mean(here == 0.0) > np.mean(there == 0.0) + _REPEATS:
+        return True
+    if np.mean(np.abs(here)) < _NEAR * np.mean(np.abs(there)):
         return True
     turn = (np.sign(step[:-1]) * np.sign(step[1:]))[close[:-1] != close[1:]]
     turn = turn[np.isfinite(turn) & (turn != 0.0)]
