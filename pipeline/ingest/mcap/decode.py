@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import chain
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.arrivals import Arrived, by_source
-from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.batch import Batch
 from kempf.pipeline.ingest.mcap.clocks import put_right
 from kempf.pipeline.ingest.mcap.corrected import Corrected
 from kempf.pipeline.ingest.mcap.fields_seen import FieldsSeen
 from kempf.pipeline.ingest.mcap.own_stamps import OwnStamps
+from kempf.pipeline.ingest.mcap.part import Part, Waiting
 from kempf.pipeline.ingest.mcap.publishers import Publishers
 from kempf.pipeline.ingest.mcap.recorder_time import TIMES, RecorderTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
@@ -29,74 +29,13 @@ from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
 from kempf.schemas.profile import ChannelMap, Source
 
-T = TypeVar("T", bound=np.generic)
-
 #: Topics that are named in a message to a person, at most.
 _NAMED = 20
-
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """The records of some megabytes of the file, decoded and not yet checked."""
-
-    #: Where they stand.
-    batch: Batch
-    #: Shape (m,).
-    time_ns: NDArray[np.int64]
-    #: Shape (m,). Place of the topic in the order in which topics come, -1 where it is unknown.
-    topic: NDArray[np.int64]
-    #: Shape (m,). Code of the reason for which a record is refused, 0 for none.
-    reason: NDArray[np.int8]
-    #: Shape (m,). Whether the payload is text.
-    text: NDArray[np.bool_]
-    #: By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
-    values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
-    #: Number of the first record in the file.
-    first: int = 0
-    #: Good messages of the channels that are read, for the questions of clocks; empty where these are settled.
-    arrived: list[Arrived] = field(default_factory=list)
-    #: Numbers of records within the part, of the channels that share their topic with another one.
-    shared: list[tuple[int, str, NDArray[np.int64]]] = field(default_factory=list)
-
-
-_NO_BATCH = joined([])
 
 #: Messages that are checked and handed on together.
 _TOGETHER = 1 << 16
 #: Messages by which it is judged whether the times of a log can be believed; if not, it is read through for them first.
 _SAMPLE = 1 << 16
-
-
-class _Waiting:
-    """Parts that become one."""
-
-    def __init__(self) -> None:
-        self._places, self.parts = PayloadsBuilder(), list[Part]()
-        self.size = 0
-        #: Whether nothing of the file follows.
-        self.ends = False
-
-    def add(self, part: Part) -> None:
-        """Take one more; of its bytes only where they stand."""
-        self._places.add(part.batch)
-        self.parts.append(replace(part, batch=_NO_BATCH))
-        self.size += part.time_ns.size
-
-    def decoded(self, log: LogFile, first: int, topics: tuple[str, ...]) -> Decoded:
-        """Return them as one, the first record of which has the number ``first``; more of the log follows."""
-        parts = self.parts
-        payloads = self._places.build(log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
-        return Decoded(
-            np.arange(first, first + self.size, dtype=np.int64),
-            payloads,
-            payloads,
-            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
-            _joined([part.topic for part in parts], np.empty(0, np.int64)),
-            topics,
-            _joined([part.reason for part in parts], np.empty(0, np.int8)),
-            _dense(parts),
-            ends=False,
-        )
 
 
 def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
@@ -204,7 +143,7 @@ class _DecodeJob:
 
     def run(self, patterns: list[str]) -> Iterator[Decoded]:
         """Read the file through."""
-        first, groups, sample = 0, self._groups(), list[_Waiting]()
+        first, groups, sample = 0, self._groups(), list[Waiting]()
         for group in groups:
             sample.append(group)
             if sum(own.size for own in sample) >= _SAMPLE:
@@ -228,18 +167,18 @@ class _DecodeJob:
             yield self._part(batch, first)
             first += batch.first.size
 
-    def _groups(self) -> Iterator[_Waiting]:
+    def _groups(self) -> Iterator[Waiting]:
         """Read the file some ten thousand messages at a time, the last of them perhaps none."""
-        waiting = _Waiting()
+        waiting = Waiting()
         for part in self.parts():
             waiting.add(part)
             if waiting.size >= _TOGETHER:
                 yield waiting
-                waiting = _Waiting()
+                waiting = Waiting()
         waiting.ends = True
         yield waiting
 
-    def _settle_clocks(self, sample: list[_Waiting]) -> None:
+    def _settle_clocks(self, sample: list[Waiting]) -> None:
         """Judge the times of the first messages, and if they cannot be believed, those of all."""
         arrived = [one for group in sample for part in group.parts for one in part.arrived]
         corrected = self._put_right(arrived)
@@ -259,7 +198,7 @@ class _DecodeJob:
     def _source_of(self, one: Arrived) -> str:
         return self.publishers.source(one.channel, one.topic)
 
-    def _correct(self, group: _Waiting) -> None:
+    def _correct(self, group: Waiting) -> None:
         """Give records the times that were put right, and those of a second publisher a source of their own."""
         for part in group.parts:
             for one in part.arrived:
@@ -483,20 +422,3 @@ def _by_channel(channel: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.in
     for record in np.split(order, cuts):
         if record.size:
             yield int(channel[record[0]]), record
-
-
-def _joined(parts: list[NDArray[T]], empty: NDArray[T]) -> NDArray[T]:
-    return np.concatenate([empty, *parts])
-
-
-def _dense(parts: list[Part]) -> dict[str, Values]:
-    """Lay the values of all parts out over all records."""
-    n = sum(part.time_ns.size for part in parts)
-    channels: dict[str, Values] = {}
-    base = 0
-    for part in parts:
-        for name, samples in part.values.items():
-            for record, value in samples:
-                channels.setdefault(name, Values.empty(n)).put(base + record, value)
-        base += part.time_ns.size
-    return channels
