@@ -51,7 +51,7 @@ bench: $(RIVALS)
 		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.trials_as_sold diagnose.hsva_ladder \
 		diagnose.hsva_folds diagnose.pond_ladder diagnose.pond_bounds diagnose.noise_hills diagnose.diagnosis_speed identify.prediction identify.circles_in_wind identify.predicted_measured ingest.doctor_measured \
-		ingest.mcap_speed ingest.nmea_speed ingest.nmea_clocks fleet.adopt fleet.command_speed aims; \
+		ingest.mcap_speed ingest.nmea_speed ingest.nmea_clocks ingest.mcap_clocks fleet.adopt fleet.command_speed aims; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.

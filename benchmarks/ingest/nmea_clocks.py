@@ -22,7 +22,8 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.nmea_log import checksum, to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.schemas.errors import NotFound
+from kempf.schemas.errors import DataRejected, NotFound
+from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.store import Warehouse
 
 HULL = ("a11", "a12", "a21", "a22", "b1", "b2")
@@ -136,16 +137,17 @@ class Identified:
     notes: tuple[str, ...]
 
 
-def identified(log: bytes) -> Identified:
-    """Take a log in and identify the hull."""
+def identified(
+    log: bytes, name: str, profile: VesselProfile, words: tuple[str, ...] = ("clock", "stamp", "bursts")
+) -> Identified:
+    """Take a log in and identify the hull; of the notes those are kept that hold one of some words."""
     with TemporaryDirectory() as folder:
         warehouse = Warehouse(folder)
-        profile = logger_profile(SETTINGS)
-        taken = ingest_log(warehouse, "mariner", "log.nmea", LogFile(log), profile, "mariner")
-        tally, notes = (
-            taken.tally,
-            tuple(note for note in taken.notes if any(word in note for word in ("clock", "stamp", "bursts"))),
-        )
+        try:
+            taken = ingest_log(warehouse, "mariner", name, LogFile(log), profile, "mariner")
+        except DataRejected as why:
+            return Identified(0.0, None, None, (f"refused as {why.code}",))
+        tally, notes = taken.tally, tuple(note for note in taken.notes if any(word in note for word in words))
         try:
             found = identify_vessel(warehouse, "mariner")
         except NotFound:
@@ -175,7 +177,7 @@ def main() -> None:
     log = sound()
     found = {}
     for name, trouble in TROUBLES.items():
-        found[name] = identified(trouble(log))
+        found[name] = identified(trouble(log), "log.nmea", logger_profile(SETTINGS))
         print(name, found[name], flush=True)
     head = ("trouble", "kept, %", *HULL, "first note on clocks")
     lines = [

@@ -79,8 +79,9 @@ def _of_source(log_format: str, key: str) -> pl.Expr:
     if log_format == "nmea":
         return pl.col("source") == key.partition(".")[0]
     if log_format == "mcap":
-        # a topic may hold dots, a field too: the topic is what the key begins with
-        return pl.lit(key).str.starts_with(pl.col("source") + ".")
+        # a topic may hold dots, a field too: the topic is what the key begins with; a second publisher has a number
+        topic = pl.col("source").str.replace(r"#\d+$", "")
+        return pl.any_horizontal(pl.lit(key).str.starts_with(own + ".") for own in (pl.col("source"), topic))
     return pl.lit(value=True)
 
 

@@ -78,10 +78,10 @@ def test_publish_time_on_request():
 
 
 def test_times_coarser_than_the_messages_are_named_with_where_finer_ones_may_be():
-    # written once a second by the recorder
-    readings = read(write([(topic, float(int(seconds)), payload) for topic, seconds, payload in plain()]))
+    # too few seconds to tell a recorder that writes whole ones from messages that belong to one instant
+    readings = read(write([(topic, float(int(seconds)), payload) for topic, seconds, payload in plain(30)]))
     refused = readings.tally.by_reason["same_instant"]
-    assert refused > 100 and readings.notes[0].startswith(
+    assert refused > 50 and readings.notes[0].startswith(
         f"{refused} of {readings.tally.records_read} records, most of the log, are refused as same_instant"
     )
     assert "`publish_time`" in readings.notes[0]

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap import sentences
-from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.arrivals import Arrived, by_source
+from kempf.pipeline.ingest.mcap.batch import Batch
+from kempf.pipeline.ingest.mcap.clocks import put_right
+from kempf.pipeline.ingest.mcap.corrected import Corrected
+from kempf.pipeline.ingest.mcap.fields_seen import FieldsSeen
 from kempf.pipeline.ingest.mcap.files import McapFiles
 from kempf.pipeline.ingest.mcap.odd_times import OddTime
+from kempf.pipeline.ingest.mcap.own_stamps import OwnStamps
+from kempf.pipeline.ingest.mcap.part import Part, Waiting
+from kempf.pipeline.ingest.mcap.publishers import Publishers
+from kempf.pipeline.ingest.mcap.recorder_time import TIMES, RecorderTime
 from kempf.pipeline.ingest.mcap.records import McapChannel
-from kempf.pipeline.ingest.mcap.topics import Route
+from kempf.pipeline.ingest.mcap.topics import DecodedTopics, Route
 from kempf.pipeline.ingest.mcap.unmapped import NAMED, unmapped
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
@@ -24,66 +32,13 @@ from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
 from kempf.schemas.profile import ChannelMap, Source
 
-T = TypeVar("T", bound=np.generic)
-
-_TIMES = ("log_time", "publish_time")
-
 #: Messages of a topic in which NMEA sentences are looked for, and bytes of each.
 _LOOKED_AT, _HEAD = 3, 4096
 
-
-@dataclass(frozen=True, eq=False)
-class Part:
-    """The records of some megabytes of the file, decoded and not yet checked."""
-
-    #: Where they stand.
-    batch: Batch
-    #: Shape (m,).
-    time_ns: NDArray[np.int64]
-    #: Shape (m,). Place of the topic in the order in which topics come, -1 where it is unknown.
-    topic: NDArray[np.int64]
-    #: Shape (m,). Code of the reason for which a record is refused, 0 for none.
-    reason: NDArray[np.int8]
-    #: Shape (m,). Whether the payload is text.
-    text: NDArray[np.bool_]
-    #: By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
-    values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
-
-
-_NO_BATCH = joined([])
-
 #: Messages that are checked and handed on together.
 _TOGETHER = 1 << 16
-
-
-class _Waiting:
-    """Parts that become one."""
-
-    def __init__(self) -> None:
-        self._places, self._parts = PayloadsBuilder(), list[Part]()
-        self.size = 0
-
-    def add(self, part: Part) -> None:
-        """Take one more; of its bytes only where they stand."""
-        self._places.add(part.batch)
-        self._parts.append(replace(part, batch=_NO_BATCH))
-        self.size += part.time_ns.size
-
-    def decoded(self, log: LogFile, first: int, topics: tuple[str, ...]) -> Decoded:
-        """Return them as one, the first record of which has the number ``first``; more of the log follows."""
-        parts = self._parts
-        payloads = self._places.build(log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
-        return Decoded(
-            np.arange(first, first + self.size, dtype=np.int64),
-            payloads,
-            payloads,
-            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
-            _joined([part.topic for part in parts], np.empty(0, np.int64)),
-            topics,
-            _joined([part.reason for part in parts], np.empty(0, np.int8)),
-            _dense(parts),
-            ends=False,
-        )
+#: Messages by which it is judged whether the times of a log can be believed; if not, it is read through for them first.
+_SAMPLE = 1 << 16
 
 
 def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
@@ -165,13 +120,16 @@ class _DecodeJob:
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
         time = source.time if source else None
-        self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
-        self.time_field = time if time and time.column and time.column not in _TIMES else None
+        self.recorder = RecorderTime(time)
+        self.time_field = time if time and time.column and time.column not in TIMES else None
         self.routes: dict[int, Route | None] = {}
         self.made: dict[McapChannel, Route | None] = {}
         self.refused: dict[str, NoReaderError] = {}
-        self.seen: dict[str, set[str]] = {}
+        self.fields = FieldsSeen()
         self.timed, self.untimed = False, set[str]()
+        self.own_stamps, self.publishers = OwnStamps(), Publishers()
+        self.numbers: dict[str, set[int]] = {}
+        self.corrected, self.records, self.settled = Corrected({}), dict[str, NDArray[np.int64]](), False
         self.places: dict[str, int] = {}
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
@@ -189,28 +147,81 @@ class _DecodeJob:
 
     def run(self, patterns: list[str]) -> Iterator[Decoded]:
         """Read the file through."""
-        first, waiting = 0, _Waiting()
-        for part in self.parts():
-            waiting.add(part)
-            if waiting.size >= _TOGETHER:
-                yield waiting.decoded(self.log, first, tuple(self.places))
-                first, waiting = first + waiting.size, _Waiting()
-        self.require_something(patterns)
-        last = waiting.decoded(self.log, first, tuple(self.places))
-        steps = dict.fromkeys(why.next_step for why in self.refused.values() if why.next_step)
-        notes, lost = [*self.stream.notes, *self._notes()], tuple(self.stream.lost)
-        yield replace(last, notes=notes, lost=lost, next_step=" ".join(steps), ends=True)
+        first, groups, sample = 0, self._groups(), list[Waiting]()
+        for group in groups:
+            sample.append(group)
+            if sum(own.size for own in sample) >= _SAMPLE:
+                break
+        self._settle_clocks(sample)
+        for group in chain(sample, groups):
+            self._correct(group)
+            decoded = group.decoded(self.log, first, tuple(self.places))
+            first += group.size
+            if not group.ends:
+                yield decoded
+                continue
+            self.require_something(patterns)
+            notes = [*self.stream.notes, *self.recorder.notes, *self.corrected.notes, *self._notes()]
+            steps = dict.fromkeys(why.next_step for why in self.refused.values() if why.next_step)
+            lost = tuple(self.stream.lost)
+            yield replace(decoded, notes=notes, lost=lost, next_step=" ".join(steps), ends=True)
 
     def parts(self) -> Iterator[Part]:
         """Read the file a few megabytes at a time; no more than that is held."""
+        first = 0
         for batch in self.stream.batches():
-            yield self._part(batch)
+            yield self._part(batch, first)
+            first += batch.first.size
 
-    def _part(self, batch: Batch) -> Part:
+    def _groups(self) -> Iterator[Waiting]:
+        """Read the file some ten thousand messages at a time, the last of them perhaps none."""
+        waiting = Waiting()
+        for part in self.parts():
+            waiting.add(part)
+            if waiting.size >= _TOGETHER:
+                yield waiting
+                waiting = Waiting()
+        waiting.ends = True
+        yield waiting
+
+    def _settle_clocks(self, sample: list[Waiting]) -> None:
+        """Judge the times of the first messages, and if they cannot be believed, those of all."""
+        arrived = [one for group in sample for part in group.parts for one in part.arrived]
+        corrected = self._put_right(arrived)
+        ends = sample[-1].ends
+        if not ends and (corrected.times_ns or corrected.notes):
+            whole = _DecodeJob(self.name, self.log, self.source)
+            arrived = [one for part in whole.parts() for one in part.arrived]
+            corrected = self._put_right(arrived)
+        self.corrected, self.settled = corrected, True
+        sources = by_source(arrived, self._source_of) if corrected.times_ns else []
+        self.records = {own.source: own.record for own in sources if own.source in corrected.times_ns}
+
+    def _put_right(self, arrived: list[Arrived]) -> Corrected:
+        self.publishers.decide(arrived)
+        return put_right(by_source(arrived, self._source_of), stamps_count=self.time_field is not None)
+
+    def _source_of(self, one: Arrived) -> str:
+        return self.publishers.source(one.channel, one.topic)
+
+    def _correct(self, group: Waiting) -> None:
+        """Give records the times that were put right, and those of a second publisher a source of their own."""
+        for part in group.parts:
+            for one in part.arrived:
+                source = self._source_of(one)
+                if source in self.records:
+                    at = np.searchsorted(self.records[source], one.record)
+                    part.time_ns[one.record - part.first] = self.corrected.times_ns[source][at]
+            for number, topic, record in part.shared:
+                source = self.publishers.source(number, topic)
+                if source != topic:
+                    part.topic[record] = self.places.setdefault(source, len(self.places))
+
+    def _part(self, batch: Batch, first: int) -> Part:
         n = batch.first.size
-        time = (batch.log_time if self.clock == _TIMES[0] else batch.publish_time).copy()
+        time = self.recorder.of(batch)
         topic, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.bool_)
-        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {})
+        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {}, first)
         for number, record in _by_channel(batch.channel):
             channel = self.stream.channels.get(number)
             if channel is None:
@@ -224,7 +235,8 @@ class _DecodeJob:
                 part.reason[record] = CODE[Reason.NO_CHANNEL]
                 self._look_for_sentences(channel.topic, batch, record)
             else:
-                self._read(part, record, channel.topic, route)
+                self._read(part, record, number, channel, route)
+        self.fields.end_part()
         return part
 
     def _look_for_sentences(self, topic: str, batch: Batch, record: NDArray[np.int64]) -> None:
@@ -235,12 +247,13 @@ class _DecodeJob:
             if any(sentences.holds_sentence(batch.content[first:end].tobytes()) for first, end in places):
                 self.sentences.append(topic)
 
-    def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
+    def _read(self, part: Part, record: NDArray[np.int64], number: int, channel: McapChannel, route: Route) -> None:
         """Decode the messages of one channel."""
-        batch = part.batch
+        batch, topic = part.batch, channel.topic
         payloads = Spans(batch.content, batch.first[record], batch.end[record])
         self.stream.budget.decode(int((payloads.stop - payloads.start).sum()))
         decoded = route.read(payloads)
+        self._note_arrival(part, record, number, channel, decoded, payloads)
         part.reason[record[~decoded.good]] = CODE[Reason.MALFORMED]
         if decoded.time_ns is not None:
             timed = decoded.time_ns >= 0
@@ -248,12 +261,53 @@ class _DecodeJob:
             part.time_ns[record[timed]] = decoded.time_ns[timed]
             if not timed[decoded.good].all():
                 self.untimed.add(topic)
+        good = np.flatnonzero(decoded.good) if not decoded.good.all() else slice(None)
+        whole = payloads.take(good) if not isinstance(good, slice) else payloads
         for key, (value, present) in decoded.values.items():
             mapped = route.mapped[key]
+            self.fields.add(
+                key,
+                record[good],
+                present[good],
+                part.time_ns[record[good]],
+                whole,
+                channel,
+                self.stream.schemas.get(channel.schema),
+            )
             if present.any():
-                self.seen.setdefault(topic, set()).add(key)
                 samples = record[present], value[present] * mapped.factor + mapped.offset_si
                 part.values.setdefault(mapped.channel, []).append(samples)
+
+    def _note_arrival(
+        self,
+        part: Part,
+        record: NDArray[np.int64],
+        number: int,
+        channel: McapChannel,
+        decoded: DecodedTopics,
+        payloads: Spans,
+    ) -> None:
+        """Keep what the questions of clocks ask for, as long as they are open or the answer has to be applied."""
+        numbers = self.numbers.setdefault(channel.topic, set())
+        numbers.add(number)
+        if len(numbers) > 1:
+            part.shared.append((number, channel.topic, record))
+        if self.settled and not self.records and len(numbers) == 1:
+            return
+        good = decoded.good
+        stamp, value = np.full(record.size, NO_TIME), np.full(record.size, np.nan)
+        if decoded.time_ns is not None:
+            stamp = np.where(decoded.time_ns >= 0, decoded.time_ns, NO_TIME)
+        elif not self.settled:
+            stamp = self.own_stamps.read(channel, self.stream.schemas.get(channel.schema), payloads)
+        for own, present in decoded.values.values():
+            value = np.where(present, own, np.nan)
+            break
+        part.arrived.append(
+            Arrived(
+                number, channel.topic, part.first + record[good], part.time_ns[record[good]], stamp[good], value[good]
+            )
+        )
 
     def _route(self, number: int, channel: McapChannel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
@@ -289,7 +343,9 @@ class _DecodeJob:
 
     def _refuse_late_owner(self, before: dict[str, tuple[str, str]], topic: str) -> None:
         """Refuse a file whose summary leaves out a topic to which a key belongs that was read from another one."""
-        misread = [key for key, owner in before.items() if self.owners[key] != owner and owner[0] in self.seen]
+        misread = [
+            key for key, owner in before.items() if self.owners[key] != owner and owner[0] in self.fields.topics()
+        ]
         if misread:
             raise DataRejected(
                 "summary_incomplete",
@@ -308,10 +364,11 @@ class _DecodeJob:
         for number, route in self.routes.items():
             topic = self.stream.channels[number].topic
             for key in route.mapped if route else ():
-                if key not in self.seen.get(topic, ()):
+                if not self.fields.seen(topic, key):
                     why = route.absent.get(key) if route else None
                     absent[topic, key] = f"No message of {topic} has the field {key}{f': {why}' if why else ''}."
         notes += absent.values()
+        notes += self.fields.notes()
         assert self.time_field is not None or not self.untimed
         odd, of_times = self._odd_times(), dict.fromkeys(n for r in self.routes.values() if r for n in r.time_notes)
         for topic in sorted(self.untimed):
@@ -319,8 +376,10 @@ class _DecodeJob:
             found = f"have log time where {column} is no time, such as {odd[topic].found}" if topic in odd else ""
             notes.append(f"Messages of {topic} {found or f'without {column} have log time'}.")
         notes += of_times
+        notes += self.publishers.notes()
         read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
-        others = sorted(set(self.places) - read - set(self.refused))
+        topics = {channel.topic for channel in self.stream.channels.values()}
+        others = sorted((set(self.places) & topics) - read - set(self.refused))
         if others:
             more = f" and {len(others) - NAMED} more" if len(others) > NAMED else ""
             notes.append(f"Topics without a channel: {', '.join(others[:NAMED])}{more}.")
@@ -350,7 +409,7 @@ class _DecodeJob:
             raise UsageError(
                 "no_time_column",
                 f"The source for {self.name} takes its time from {column!r}, which no message that it maps has; "
-                f"every MCAP message has {' and '.join(_TIMES)}.",
+                f"every MCAP message has {' and '.join(TIMES)}.",
                 "Name one of these or a field of the messages, such as header.stamp, as the column of 'time', "
                 "or leave 'time' out.",
                 {"name": self.name, "column": column},
@@ -385,20 +444,3 @@ def _by_channel(channel: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.in
     for record in np.split(order, cuts):
         if record.size:
             yield int(channel[record[0]]), record
-
-
-def _joined(parts: list[NDArray[T]], empty: NDArray[T]) -> NDArray[T]:
-    return np.concatenate([empty, *parts])
-
-
-def _dense(parts: list[Part]) -> dict[str, Values]:
-    """Lay the values of all parts out over all records."""
-    n = sum(part.time_ns.size for part in parts)
-    channels: dict[str, Values] = {}
-    base = 0
-    for part in parts:
-        for name, samples in part.values.items():
-            for record, value in samples:
-                channels.setdefault(name, Values.empty(n)).put(base + record, value)
-        base += part.time_ns.size
-    return channels

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.ingest.bursts import are_coarse
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds, Reason
 from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
-from kempf.pipeline.ingest.nmea.logger_clock import LoggerTimes, are_coarse, on_utc, spread
+from kempf.pipeline.ingest.nmea.logger_clock import LoggerTimes, on_utc, put_evenly
 from kempf.pipeline.ingest.nmea.receiver import fixes_of_one, speaking
-from kempf.pipeline.ingest.nmea.shares import shares_of
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
+from kempf.pipeline.ingest.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
 from kempf.schemas.nmea import SENTENCES
@@ -86,7 +87,7 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
         stamps = LoggerTimes(_set_right(frames.stamp_ns, times, notes))
         # two listeners that write one file make every stamp come twice
         if are_coarse(stamps.time_utc_ns) and are_coarse(stamps.time_utc_ns[~_repeats(frames)]):
-            stamps = spread(stamps.time_utc_ns, _sources(frames, said, np.zeros(n, dtype=np.bool_)))
+            stamps = put_evenly(stamps.time_utc_ns, _sources(frames, said, np.zeros(n, dtype=np.bool_)))
         full = _by_stamps(times, stamps.time_utc_ns)
         dated &= stamps.time_utc_ns != NO_TIME
         believed, differing = fixes_of_one(frames, dated, stamps.time_utc_ns - full)

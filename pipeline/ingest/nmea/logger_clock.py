@@ -6,23 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.ingest.bursts import spread
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.nmea.receiver import ARRIVES_NS
-from kempf.pipeline.ingest.nmea.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
-#: Stamps of one source, by which it is judged whether several of its sentences come together.
-_LEAST = 20
-#: Share of the stamps that are whole seconds where all are meant to be, and of the bursts of a source in which it says
-#: several sentences where that is no accident.
-_WHOLE, _SHARED = 0.99, 0.1
-#: Lines of one burst follow each other within this, ns, and at least this share of all lines follow another so.
-_TOGETHER_NS, _IN_BURSTS = SECOND_NS // 50, 0.5
-#: Lines by which it is judged whether a log comes in bursts.
-_SAMPLE = 20_000
-#: A burst brings what came since the one before, if that is no longer ago than so many usual distances.
-_USUAL = 1.5
 #: A receiver that sends so late, or a clock that is so far off or leaps so far, is worth a note, ns.
 _WORTH_NS = SECOND_NS // 2
 #: Fixes that can put a clock right: one may have waited.
@@ -41,32 +30,8 @@ class LoggerTimes:
     notes: tuple[str, ...] = ()
 
 
-def are_coarse(stamp_ns: Nanoseconds) -> bool:
-    """Return whether stamps may be whole seconds, or those of a logger that looks for sentences now and then.
-
-    Parameters
-    ----------
-    stamp_ns : ndarray of int64, shape (n,)
-        `NO_TIME` where a line has none.
-    """
-    known = stamp_ns[stamp_ns != NO_TIME]
-    if known.size < _LEAST:
-        return False
-    since = np.diff(known)
-    return _whole(known) or bool(np.mean((since >= 0) & (since < _TOGETHER_NS)) >= _IN_BURSTS)
-
-
-def _whole(stamp_ns: Nanoseconds) -> bool:
-    # most logs are answered by their first lines
-    few = stamp_ns[:_LEAST]
-    return bool(np.mean(few % SECOND_NS == 0) >= 0.5 and np.mean(stamp_ns % SECOND_NS == 0) >= _WHOLE)
-
-
-def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
-    """Spread the sentences that share a stamp over the time that it stands for.
-
-    A stamp of whole seconds stands for the second that begins with it. What comes in bursts, as from a serial server or
-    a logger that looks once a second, came since the burst before.
+def put_evenly(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
+    """Spread the sentences that share a stamp over its time, as `kempf.pipeline.ingest.bursts.spread` does, and say so.
 
     Parameters
     ----------
@@ -75,62 +40,20 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
     source : ndarray of int64, shape (n,)
         Which instrument a line comes from; -1 where none is read.
     """
-    (record,) = np.nonzero((stamp_ns != NO_TIME) & (source >= 0))
-    if record.size == 0:
+    found = spread(stamp_ns, source)
+    if found.lasting_ns is None:
         return LoggerTimes(stamp_ns)
-    stamp, own = stamp_ns[record], source[record]
-    whole = _whole(stamp)
-    # lines that follow each other, and no others: a log may hold one stretch twice
-    begins = np.concatenate(([True], np.abs(np.diff(stamp)) >= (1 if whole else _TOGETHER_NS)))
-    burst, first = np.cumsum(begins), np.flatnonzero(begins)
-    begun = stamp[first][burst - 1]
-    # most logs have none, which their first lines show
-    if not whole and _usual(own[:_SAMPLE], burst[:_SAMPLE], begun[:_SAMPLE]) is None:
-        return LoggerTimes(stamp_ns)
-    shares = shares_of(own, burst)
-    shared, came = shares.shared, begun[shares.order]
-    if whole:
-        lasting, ends = np.full(record.size, SECOND_NS), came + SECOND_NS
+    if found.whole:
         note = (
             "The logger's stamps are whole seconds: sentences were spread evenly over each, and one that comes once in "
             "a second is known to half a second (1/sqrt(12) s, 1 s.e.: 0.29 s)."
         )
     else:
-        usual = _usual(own, burst, begun)
-        if usual is None:
-            return LoggerTimes(stamp_ns)
-        since = np.concatenate(([usual], np.diff(came[shares.heads])))
-        since[(since <= 0) | (since > _USUAL * usual)] = usual  # another source, a pause, one that speaks seldom
-        lasting, ends = np.repeat(since, shares.count), came
         note = (
-            f"The log's sentences come in bursts, every {usual / SECOND_NS:.3g} s (median): they were spread evenly "
-            "over the time since the burst before."
+            f"The log's sentences come in bursts, every {found.lasting_ns / SECOND_NS:.3g} s (median): they were "
+            "spread evenly over the time since the burst before."
         )
-    result = stamp_ns.copy()
-    # each in the middle of its share of the time
-    result[record[shares.order]] = ends - (2 * (shared - shares.place) - 1) * lasting // (2 * shared)
-    return LoggerTimes(result, (note,))
-
-
-def _usual(source: Index, burst: Index, came_ns: Nanoseconds) -> int | None:
-    """Return the usual distance of bursts, ns; None where no source often has several sentences in one.
-
-    Parameters
-    ----------
-    source, burst, came_ns : ndarray of int64, shape (m,)
-        Of every line: where it comes from, in which burst, and when that began.
-    """
-    shares = shares_of(source, burst)
-    first, count = shares.order[shares.heads], shares.count
-    source, came_ns = source[first], came_ns[first]
-    distances = []
-    for one in np.unique(source):
-        of_it = source == one
-        if count[of_it].sum() >= _LEAST and np.mean(count[of_it] >= 2) >= _SHARED:
-            distances.append(np.diff(came_ns[of_it]))
-    between = np.concatenate(distances) if distances else np.zeros(0, dtype=np.int64)
-    between = between[between > 0]
-    return int(np.sort(between)[between.size // 2]) if between.size else None
+    return LoggerTimes(found.time_ns, (note,))
 
 
 def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:

@@ -1,4 +1,4 @@
-"""Sentences of one instrument that come together: which each is, of how many."""
+"""Records of one instrument that come together: which each is, of how many."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from kempf.pipeline.ingest.spans import Index
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """Lines in the order of their source, those of one source in the order of what they come with."""
+    """Records in the order of their source, those of one source in the order of what they come with."""
 
     #: Shape (n,). Their numbers in that order.
     order: Index
@@ -32,12 +32,12 @@ class Shares:
 
 
 def shares_of(source: Index, group: Index) -> Shares:
-    """Return which lines come together.
+    """Return which records come together.
 
     Parameters
     ----------
     source, group : ndarray of int64, shape (n,)
-        Instrument of each line, and the number of the fix, the second or the burst that it comes with.
+        Instrument of each record, and the number of the fix, the second or the burst that it comes with.
 
     Examples
     --------
