@@ -41,27 +41,6 @@ _TOGETHER = 1 << 16
 _SAMPLE = 1 << 16
 
 
-def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
-    """Decode an MCAP log a few megabytes at a time, for those who keep less of it than `decode` does.
-
-    Parameters
-    ----------
-    name, log, source
-        See `decode`; the source has channels.
-
-    Yields
-    ------
-    Part
-        In the order of the file.
-
-    Raises
-    ------
-    UsageError, DataRejected
-        See `decode`, but for what is known only at the end of the file.
-    """
-    return _DecodeJob(name, log, source).parts()
-
-
 def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Iterator[Decoded]:
     """Decode an MCAP log as the profile's source describes it, some ten thousand messages at a time.
 
