@@ -76,23 +76,34 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
         Share the passes; nothing depends on it.
     """
     covariance = np.nan_to_num(fit.covariance)
-    rows, std_s, foreign = _rows(fit, workers)
-    smoothed = _smoothed(fit, workers)
-    if not std_s.size and not smoothed.size:
+    rows = _rows(fit, workers)
+    late = [*rows, *_smoothed(fit, workers)]
+    if not late:
         return WithInstants(fit, np.zeros_like(covariance))
-    shared, m, parts = covariance.shape[0], std_s.size, std_s.size + smoothed.shape[1]
-    columns = np.column_stack([rows, smoothed])
+    std_s = np.array([one.std_s[log] for one in rows for log in one.logs])
+    foreign = np.array([one.foreign for one in rows for _ in one.logs])
+    places, parts = [], 0
+    for one in late:
+        places.append({log: parts + k for k, log in enumerate(one.logs)})
+        parts += len(one.logs)
+    shared, m = covariance.shape[0], std_s.size
     across, own, score = np.zeros((shared, parts)), np.zeros((m, parts)), np.zeros(m)
     first = 0
-    for line in fit.linearised:
-        late = columns[first : first + line.u.size]
+    for filtered, line in zip(fit.runs, fit.linearised, strict=True):
+        log, part = filtered.run.day, slice(first, first + line.u.size)
         first += line.u.size
+        # every log is late by itself: what others are late by is nothing to this run
+        at = np.array([place[log] for place in places if log in place], dtype=np.intp)
+        if not at.size:
+            continue
+        column = np.column_stack([one.column[part] for one in late if log in one.std_s])
         common, levels = columns_of(line, shared)
         basis = orthonormal(levels)
-        late = late - basis @ (basis.T @ late)
-        across[[i for i in line.index if i < shared]] += common.T @ late
-        own += late[:, :m].T @ late
-        score += foreign * (late[:, :m].T @ line.u)
+        column = column - basis @ (basis.T @ column)
+        free = at[at < m]
+        across[np.ix_(np.array([i for i in line.index if i < shared], dtype=np.intp), at)] += common.T @ column
+        own[np.ix_(free, at)] += column[:, : free.size].T @ column
+        score[free] += foreign[free] * (column[:, : free.size].T @ line.u)
     # what every column does beside the hull, and each to the hull
     beside, to_hull = own - across[:, :m].T @ covariance @ across, covariance @ across
     late_covariance = inverse(beside[:, :m] + np.diag(std_s**-2.0))
@@ -116,12 +127,26 @@ def within_rows(fit: PooledFit, effect: Effect) -> bool:
     return bool(abs(fit.values[-1]) < _APART * std_s)
 
 
-def _rows(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
-    """Return what a second of lateness does to the innovations, shape (N, m), and what it is off by, s, shape (m,).
+@dataclass(frozen=True, eq=False)
+class _Late:
+    """What the lateness of one instrument does, in every log by itself."""
 
-    There is one for every instrument and log whose instants are not known. The last of shape (m,) is 0 where the model
-    has the latency itself, which imitates it in full: at the maximum nothing is left of it to be found.
-    """
+    #: Shape (N,). To the innovations of all runs, a second of it.
+    column: Float
+    #: Standard deviation of the lateness by log, s; only logs of which it is not known.
+    std_s: Mapping[int, float]
+    #: 0 where the model has the latency itself, which imitates it in full: at the maximum nothing is left of it to be
+    #: found.
+    foreign: float = 1.0
+
+    @property
+    def logs(self) -> list[int]:
+        """The logs, in order."""
+        return sorted(self.std_s)
+
+
+def _rows(fit: PooledFit, workers: Executor) -> list[_Late]:
+    """Return what a second of lateness does, of every instrument whose instants are not known in some log."""
     errors = {
         effect: [getattr(filtered.run.instant_errors, of) for filtered in fit.runs] for of, effect in _LATE.items()
     }
@@ -131,31 +156,25 @@ def _rows(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
     by_effect = dict(
         zip(tried, responses(fit, [EffectTrial(get(name), (_STEP_S,)) for name in tried], workers), strict=True)
     )
-    columns, std_s, foreign = [np.zeros((sum(line.u.size for line in fit.linearised), 0))], [np.zeros(0)], []
+    rows = []
     for effect, std in unsure.items():
         column = _own(fit, has.index(effect)) if effect in has else by_effect[effect]
-        if column is None:
-            continue
-        own, known_to = _by_log(fit, column, std)
-        columns.append(own)
-        std_s.append(known_to)
-        foreign += [float(effect not in has)] * known_to.size
-    return np.column_stack(columns), np.concatenate(std_s), np.array(foreign)
+        if column is not None:
+            rows.append(_Late(column.ravel(), _by_log(fit, std), float(effect not in has)))
+    return rows
 
 
-def _smoothed(fit: PooledFit, workers: Executor) -> Float:
-    """Return what a lateness that is a standard error larger does to the innovations, shape (N, m).
+def _smoothed(fit: PooledFit, workers: Executor) -> list[_Late]:
+    """Return what a lateness that is a standard error larger does, where a velocity may be late; else nothing.
 
-    There is one for every log with a velocity that may be late, in each run by the error that it has there. The
-    readings themselves change, so that what they are late by as a signal and what they have lost of their noise is in
-    it.
+    In each run it is by the error that it has there. The readings themselves change, so that what they are late by as a
+    signal and what they have lost of their noise is in it.
     """
     late = [float(filtered.run.instant_errors.smoothing_s > 0.0) for filtered in fit.runs]
-    size = sum(line.u.size for line in fit.linearised)
     if not any(late):
-        return np.zeros((size, 0))
+        return []
     column = np.concatenate(list(workers.map(lambda number: _less_late(fit, number), range(len(fit.runs)))))
-    return _by_log(fit, column, late)[0]
+    return [_Late(column, _by_log(fit, late))]
 
 
 def _less_late(fit: PooledFit, number: int) -> Float:
@@ -171,21 +190,9 @@ def _less_late(fit: PooledFit, number: int) -> Float:
     return run.instant_errors.smoothing_s * difference(line.passed, passed, _STEP_S)
 
 
-def _by_log(fit: PooledFit, column: Float, errors: Sequence[float]) -> tuple[Float, Float]:
-    """Return a column for every log of which something is not known, and by how much, s.
-
-    Parameters
-    ----------
-    column : ndarray, shape (N,)
-        Of all runs.
-    errors : sequence of float
-        Of every run.
-    """
-    day = np.repeat([filtered.run.day for filtered in fit.runs], [line.u.size for line in fit.linearised])
-    of_day = {filtered.run.day: s for filtered, s in zip(fit.runs, errors, strict=True) if s > 0.0}
-    logs = sorted(of_day)
-    columns = np.where(day[:, None] == logs, column.reshape(-1, 1), 0.0)
-    return columns, np.array([of_day[number] for number in logs])
+def _by_log(fit: PooledFit, errors: Sequence[float]) -> dict[int, float]:
+    """Return the errors of runs by their logs, those that are not nothing."""
+    return {filtered.run.day: s for filtered, s in zip(fit.runs, errors, strict=True) if s > 0.0}
 
 
 def _own(fit: PooledFit, number: int) -> Float | None:
