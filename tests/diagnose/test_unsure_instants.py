@@ -146,19 +146,19 @@ def test_instants_of_rows_follow_a_lateness_that_is_only_considered() -> None:
     fit = fit_plain([with_slope(run) for run in ship.runs[:2]], ship.spec, WORKERS).fit
     unsure = _unsure(fit, InstantErrors(heading_s=0.05, smoothing_s=0.03), (0,))
     found = with_instants(unsure, WORKERS)
-    rows, std_s, _ = unsure_instants._rows(unsure, WORKERS)
-    smoothed = unsure_instants._smoothed(unsure, WORKERS)
-    assert (rows.shape[1], smoothed.shape[1]) == (1, 1)
+    (row,), (smoothed,) = unsure_instants._rows(unsure, WORKERS), unsure_instants._smoothed(unsure, WORKERS)
+    assert row.logs == smoothed.logs == [0]
     parts = []
     first = 0
-    for line in unsure.linearised:
-        own = np.column_stack([line.J, rows[first : first + line.u.size], smoothed[first : first + line.u.size]])
+    for filtered, line in zip(unsure.runs, unsure.linearised, strict=True):
+        late = [one.column[first : first + line.u.size] * (filtered.run.day == 0) for one in (row, smoothed)]
+        own = np.column_stack([line.J, *late])
         levels = [k for k, i in enumerate(line.index) if i >= 6]
         basis = np.linalg.qr(own[:, levels])[0]
         parts.append((own - basis @ (basis.T @ own))[:, [k for k in range(own.shape[1]) if k not in levels]])
         first += line.u.size
     J = np.concatenate(parts)
-    estimated = J[:, :7].T @ J[:, :7] + np.diag([0.0] * 6 + [std_s[0] ** -2.0])
+    estimated = J[:, :7].T @ J[:, :7] + np.diag([0.0] * 6 + [row.std_s[0] ** -2.0])
     estimated[:6, :6] = np.linalg.inv(unsure.covariance)
     # of parameters that are estimated: their own errors, and what the considered one makes of them
     own = np.linalg.inv(estimated)
