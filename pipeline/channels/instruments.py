@@ -161,7 +161,10 @@ def _also(frame: pl.LazyFrame, source: str, group: tuple[str, ...], chosen: dict
         return source
     channels, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
     found = {name: difference(name, chosen[name], channels[name]) for name in group}
-    differ = "; ".join(f"{name} {words}" if len(group) > 1 else words for name, words in found.items() if words)
+    if len(set(found.values())) == 1:
+        differ = next(iter(found.values()))
+    else:
+        differ = "; ".join(f"{name} {words}" for name, words in found.items() if words)
     return f"{source} ({differ})" if differ else source
 
 

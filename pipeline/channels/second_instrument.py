@@ -8,6 +8,8 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
 
+#: Within so much two instruments are alike: sentences of one receiver differ by their decimals.
+_ALIKE = {"deg": 0.1, "deg/s": 0.01, "m/s": 0.02}
 #: common instants from which a difference is told
 _FEWEST = 10
 _MOST = 0.95
@@ -32,6 +34,8 @@ def difference(name: str, chosen: Series, other: Series) -> str | None:
     >>> gyro = Series(time, np.sin(time / 1e10))
     >>> difference("heading", gyro, Series(time, gyro.value + np.deg2rad(2.5)))
     '+2.5 deg in the median, 95 % within 0 deg of that'
+    >>> difference("heading", gyro, gyro)
+    'alike'
     """
     beside = chosen.at(other.time_utc_ns, gap_limit_s(chosen))
     more = (other.value - beside)[np.isfinite(beside)]
@@ -47,4 +51,6 @@ def difference(name: str, chosen: Series, other: Series) -> str | None:
     about = float(np.quantile(np.abs(more - middle), _MOST))
     # what the rounding of floating-point numbers leaves is no difference
     middle, about = round(middle, 6) + 0.0, round(about, 6)
+    if abs(middle) + about <= _ALIKE.get(unit, 0.0):
+        return "alike"
     return f"{middle:+.2g} {unit} in the median, {100 * _MOST:.0f} % within {about:.2g} {unit} of that"
