@@ -6,6 +6,7 @@ A manoeuvre that lies in two logs is found in neither, or as a part in each.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from shlex import quote
 
 from kempf.warehouse.logs import LogRow
 
@@ -34,6 +35,6 @@ def _hint(names: list[str]) -> str:
     listed = " and ".join(names) if len(names) == 2 else f"{names[0]} to {names[-1]}, {len(names)} logs,"
     return (
         f"{listed} follow each other without a pause, as parts of one recording do. A manoeuvre that lies in two of "
-        f"them is not found whole: put them behind each other, as with `cat {names[0]} {names[1]}"
+        f"them is not found whole: put them behind each other, as with `cat {quote(names[0])} {quote(names[1])}"
         f"{' ...' if len(names) > 2 else ''} > whole.mcap`, and take that in; what the parts hold too counts once."
     )

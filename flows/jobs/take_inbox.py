@@ -38,7 +38,7 @@ _PASSING = ("file_unreadable", "no_such_file", "log_unreadable", "internal")
 #: files whose outcome is stored together
 _TOGETHER = 50
 #: what rosbag2 writes beside the files of a bag, which is no log, and how these end
-_BAG_DESCRIPTION, _OF_BAGS = "metadata.yaml", (".mcap", ".mcap.zstd")
+_BAG_DESCRIPTION, _OF_BAGS = "metadata.yaml", (".mcap", ".mcap.zstd", ".mcap.zst", ".mcap.gz")
 
 
 @dataclass(frozen=True)

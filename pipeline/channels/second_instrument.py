@@ -10,7 +10,7 @@ from kempf.schemas.channels import CHANNELS
 
 #: Within so much two instruments are alike: sentences of one receiver differ by their decimals.
 _ALIKE = {"deg": 0.1, "deg/s": 0.01, "m/s": 0.02}
-#: common instants from which a difference is told
+#: common instants from which a difference is stated
 _FEWEST = 10
 _MOST = 0.95
 

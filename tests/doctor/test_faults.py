@@ -10,7 +10,7 @@ import pytest
 from kempf.pipeline.channels.doctor.corrections import setting
 from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine, examine_window
 from kempf.pipeline.channels.doctor.faults import AXES, BOW_AND_COURSE, UNITS, Fault
-from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.doctor.log import EARTH_M, Log
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from tests.doctor import closed_form_ship
 
@@ -118,6 +118,15 @@ def test_a_body_fixed_velocity_that_counts_to_port_contradicts_the_fixes() -> No
     assert sound.verdict == "clean"
     (figure,) = next(outcome for outcome in sound.outcomes if outcome.check == "across_body").figures
     assert figure.value == pytest.approx(1.0, abs=4.0 * figure.std)
+    # an antenna far ahead of the point about which she turns goes to the other side than she drifts
+    latitude, longitude = log.series["latitude"], log.series["longitude"]
+    ahead_m = 60.0 * np.exp(1j * np.interp(latitude.time_utc_ns, velocity.time_utc_ns, np.unwrap(psi)))
+    shrink = np.cos(np.median(latitude.value))
+    moved = {
+        "latitude": Series(latitude.time_utc_ns, latitude.value + ahead_m.real / EARTH_M),
+        "longitude": Series(longitude.time_utc_ns, longitude.value + ahead_m.imag / EARTH_M / shrink),
+    }
+    assert examine(log.with_series(moved)).verdict == "clean"
     (finding,) = examine(changed(log, "velocity_starboard", -1.0)).findings
     assert [f.key for f in finding.faults] == [("sign", ("velocity_starboard",), "")]
     assert [outcome.check for outcome in finding.evidence] == ["across_body"]

@@ -4,6 +4,7 @@ import io
 import json
 
 import numpy as np
+import polars as pl
 import pytest
 from mcap.writer import Writer
 
@@ -291,11 +292,76 @@ def test_halves_in_another_order_and_copies_are_no_clock_that_was_set() -> None:
         assert readings.tally.records_rejected > 0
 
 
+@pytest.mark.parametrize("per_s", [1e3, 0.5, 1.02], ids=["ms since boot", "a simulation", "another clock's pace"])
+def test_a_number_that_does_not_pass_as_log_time_does_is_no_stamp(per_s: float) -> None:
+    log = [
+        (at, topic, {**data, "timestamp": 0.5 + (true - START) / 1e9 * per_s}, true)
+        for at, topic, data, true in messages(seconds=120.0)
+    ]
+    readings = read(write(log))
+    assert readings.notes == () and readings.tally.records_rejected == 0
+    assert np.all(off_s(readings, "/gyro", seconds=120.0) == 0.004)
+
+
+@pytest.mark.parametrize("time", [None, {"column": "header.stamp"}])
+def test_a_stall_behind_which_all_that_waited_comes_at_once_is_no_clock_that_was_set(time: dict | None) -> None:
+    begin, end = START + 30 * SECOND, START + 33 * SECOND
+    held = [
+        (end + 1_000 * k if begin < at <= end else at, topic, data, true)
+        for k, (at, topic, data, true) in enumerate(messages())
+    ]
+    readings = read(write(stamped(held, ["/gyro"])), profile(time))
+    assert not any("clock was set" in note for note in readings.notes)
+    # messages without a stamp are late only where they waited
+    off = np.abs(off_s(readings, "/rudder"))
+    assert np.all(off[true_times("/rudder") < begin - SECOND // 10] < 0.01)
+
+
+def test_a_second_recorder_behind_the_first_is_no_clock_that_was_set() -> None:
+    log = messages()
+    late = [(at + 3_000_000 + k % 7 * 100_000, *rest) for k, (at, *rest) in enumerate(log)]
+    readings = read(write([*log, *late], in_order=False))
+    assert not any("clock was set" in note for note in readings.notes)
+
+
+def test_the_clock_that_agrees_with_the_recorder_is_kept_beside_one_that_is_a_little_ahead() -> None:
+    log = stamped(stamped(messages(), ["/gyro"]), ["/log"], ahead=300_000_000)
+    readings = read(write(log), profile({"column": "header.stamp"}))
+    assert np.all(off_s(readings, "/gyro") == 0.0)
+    assert np.all(np.abs(off_s(readings, "/rudder")) < 0.01)
+    assert np.all(np.abs(off_s(readings, "/log")) < 0.02)
+    (note,) = (note for note in readings.notes if "ahead of log time" in note)
+    assert "/log" in note and "/gyro" not in note
+
+
+def test_a_single_wrong_stamp_moves_no_other_message() -> None:
+    log = stamped(messages(seconds=120.0), ["/gyro", "/log"], ahead=300_000_000)
+    at, topic, data, true = log[400]
+    while topic != "/gyro":
+        log = log[1:]
+        at, topic, data, true = log[400]
+    log[400] = (at, topic, {**data, "header": {"stamp": {"sec": true // SECOND + 10, "nanosec": 0}}}, true)
+    found = read(write(log), profile({"column": "header.stamp"}))
+    steps = np.diff(times(found, "/rudder")) / 1e9
+    assert np.max(np.abs(steps - 0.5)) < 0.05
+
+
+@pytest.mark.parametrize("order", [("1", "2"), ("2", "1")])
+def test_publishers_are_parted_whichever_speaks_first_and_through_several_files(order: tuple[str, str]) -> None:
+    first = write(messages(), channel_of=lambda topic, k: topic + order[k % 2])
+    later = [(at + 60 * SECOND, topic, data, true) for at, topic, data, true in messages()]
+    second = write(later, channel_of=lambda topic, k: topic + order[k % 2])
+    one = read(first).frame.filter(pl.col("source").str.starts_with("/gyro"))["source"].value_counts()
+    both = read(first + second).frame.filter(pl.col("source").str.starts_with("/gyro"))["source"].value_counts()
+    counts = dict(one.iter_rows())
+    assert set(counts) == {"/gyro", "/gyro#2"} and sum(counts.values()) == 300
+    assert dict(both.iter_rows()) == {source: 2 * many for source, many in counts.items()}
+
+
 def test_a_log_that_is_longer_than_the_sample_is_read_through_for_its_clocks(monkeypatch) -> None:
     data = write(moved(every(1.0), ["/gyro"], seconds=120.0))
     wanted = read(data)
-    monkeypatch.setattr(decode, "_SAMPLE", 200)
-    monkeypatch.setattr(decode, "_TOGETHER", 50)
+    monkeypatch.setattr(decode, "_TOGETHER", 200)
     monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 3000)
     found = read(data)
     assert found.frame.equals(wanted.frame) and found.notes == wanted.notes

@@ -99,12 +99,19 @@ def test_halves_of_the_day() -> None:
 
 def test_days_of_a_spreadsheet() -> None:
     exact = "45780.324317129629630"
-    text = f"day,hdg\n{exact},1\n45781,2\n45781.5,3\n-3,4\n4.5e4,5\n"
+    text = f"day,hdg\n{exact},1\n45781,2\n4.57815e4,3\nx,4\n45.000.1,5\n"
     readings = read(text, {"column": "day", "unit": "d", "start": "1899-12-30T00:00:00Z"})
     first, second, third = readings.frame["time_utc_ns"].to_list()
     assert first == WANTED and third - second == 43_200 * 10**9
     assert datetime.fromtimestamp(second / 1e9, UTC) == datetime(2025, 5, 4, tzinfo=UTC)
     assert readings.rejected["reason"].to_list() == ["malformed", "malformed"]
+
+
+def test_days_that_have_passed_may_be_small_and_have_an_exponent() -> None:
+    text = "t,hdg\n-0.5,1\n0,2\n1.1574074074074e-05,3\n.25,4\n+1,5\n"
+    readings = read(text, {"column": "t", "unit": "d", "start": "2025-05-03T07:47:01Z"})
+    seconds = [round((time - WANTED) / 1e9, 6) for time in readings.frame["time_utc_ns"].to_list()]
+    assert seconds == [-43_200.0, 0.0, 1.0, 21_600.0, 86_400.0]
 
 
 def test_a_night_goes_on_behind_midnight() -> None:

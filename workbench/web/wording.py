@@ -124,7 +124,7 @@ def probability(value: float) -> str:
     >>> probability(0.0), probability(5.3e-205), probability(0.0123)
     ('< 1e-16', '< 1e-16', '0.012')
     """
-    return number(value, 2) if value >= _LEAST_PROBABILITY else f"< {_LEAST_PROBABILITY:.0e}"
+    return f"< {_LEAST_PROBABILITY:.0e}" if value < _LEAST_PROBABILITY else number(value, 2)
 
 
 def estimator(name: str) -> str:

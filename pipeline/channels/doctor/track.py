@@ -52,6 +52,9 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
             across = log.series["velocity_starboard"]
             mirrored = log.with_series({"velocity_starboard": Series(across.time_utc_ns, -across.value)})
             values += [other.value for other in [mirrored.over_ground(kind)] if other is not None]
+            bow = np.exp(1j * log.series["heading"].at(velocity.time_utc_ns, np.inf))
+            # what a place one metre ahead of the sensor moves more
+            values.append(np.gradient(bow, velocity.time_utc_ns / SECOND_NS))
         ways = None if still else _ways(track, velocity.time_utc_ns, *values)
         channels = ("latitude", "longitude", *velocity.channels, *(("heading",) if kind == "body" else ()))
         pair = VELOCITIES[kind]
@@ -66,7 +69,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         late = 1.0 + quantile(step, 0.5)
         one_sided = late * abs(quantile(np.diff(velocity.direction) / step, 0.5))
         outcomes += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
-        if kind == "body" and len(ways) > 2:
+        if len(values) > 2:
             outcomes.append(_across(channels, ways))
     if not outcomes and "speed_over_ground" in log.series:
         outcomes += _without_course(log, track)
@@ -192,11 +195,14 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, ...], 
 
 
 def _across(channels: tuple[str, ...], ways: tuple[Complex, ...]) -> Outcome:
-    """Compare the way across the bow: a drift to the other side is as long, and its bearing in the mean as right."""
-    moved, gone, mirrored = ways
+    """Compare the way across the bow: a drift to the other side is as long, and its bearing in the mean as right.
+
+    An antenna ahead of the sensor moves across the bow by itself as she turns.
+    """
+    moved, gone, mirrored, lever = ways
     ahead, across = 0.5 * (gone + mirrored), 0.5 * (gone - mirrored)
     bow = ahead / np.maximum(np.abs(ahead), 1e-300)
-    columns = np.column_stack([np.imag(across * np.conj(bow)), np.abs(ahead)])
+    columns = np.column_stack([np.imag(across * np.conj(bow)), np.abs(ahead), np.imag(lever * np.conj(bow))])
     # what goes with the way ahead is an angle between compass and sensor
     line = fit(columns, np.imag(moved * np.conj(bow)))
     if line is None:

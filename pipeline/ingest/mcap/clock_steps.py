@@ -27,6 +27,8 @@ _GAP_NS = 10 * SECOND_NS
 #: How often topics come that come twice as often as usual, seconds for which they do so at the least, and of a log in
 #: which that is looked for.
 _TWICE, _LASTING, _OFTEN = (1.5, 2.5), 2, 30
+#: The clocks are compared over so long before a step and behind it, ns, and as long as it is itself.
+_AROUND_NS = 5 * SECOND_NS
 #: Stamps of two topics show the same step within this, ns.
 _AGREE_NS = SECOND_NS // 10
 
@@ -150,9 +152,15 @@ def _shown_by_stamps(topics: list[Arrivals], place: _Place) -> int | None:
     steps = []
     for topic in topics:
         known = topic.stamp_ns != NO_TIME
-        lead, behind = (topic.log_ns - topic.stamp_ns)[known], topic.record[known] >= place.record
-        before, after = lead[~behind][-_FEWEST:], lead[behind][:_FEWEST]
-        if min(before.size, after.size) == _FEWEST:
+        log, behind = topic.log_ns[known], topic.record[known] >= place.record
+        lead = log - topic.stamp_ns[known]
+        # as long as the queue of a stall needs, and more
+        around = abs(place.step_ns) + _AROUND_NS
+        before, after = (
+            lead[~behind & (log >= place.before_ns - around)],
+            lead[behind & (log <= place.after_ns + around)],
+        )
+        if min(before.size, after.size) >= _FEWEST:
             # the least of each: messages wait, and none comes early
             steps.append(int(after.min() - before.min()))
     if not steps or max(steps) - min(steps) > _AGREE_NS:
@@ -168,12 +176,14 @@ def _gone_over_twice(topics: list[Arrivals], place: _Place) -> bool:
         within = (topic.log_ns >= place.after_ns) & (topic.log_ns <= place.before_ns)
         due += (place.before_ns - place.after_ns) / max(_period(topic), 1)
         before, after = before + np.sum(within & ~behind), after + np.sum(within & behind)
-        # the same messages once more are a copy, such as that of a chunk
+        # the same messages once more are a copy, such as that of a chunk or of a second recorder
         (first, once), (second, again) = (
             (topic.log_ns[own], topic.value[own]) for own in (within & ~behind, within & behind)
         )
-        at = np.minimum(np.searchsorted(first, second), max(first.size - 1, 0))
-        copied += np.sum((first[at] == second) & (once[at] == again)) if first.size else 0
+        if first.size:
+            # a second recorder has the same message some milliseconds later
+            at = np.clip(np.searchsorted(first, second - _period(topic) // 2), 0, first.size - 1)
+            copied += np.sum(once[at] == again)
     return due >= _DUE and min(before, after) >= _COVERED * due and copied < _COPIED * after
 
 

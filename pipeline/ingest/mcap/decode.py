@@ -35,10 +35,9 @@ from kempf.schemas.profile import ChannelMap, Source
 #: Messages of a topic in which NMEA sentences are looked for, and bytes of each.
 _LOOKED_AT, _HEAD = 3, 4096
 
-#: Messages that are checked and handed on together.
+#: Messages that are checked and handed on together. By the first of these it is judged whether the times of a log can
+#: be believed; if not, it is read through for them first.
 _TOGETHER = 1 << 16
-#: Messages by which it is judged whether the times of a log can be believed; if not, it is read through for them first.
-_SAMPLE = 1 << 16
 
 
 def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Iterator[Decoded]:
@@ -126,13 +125,10 @@ class _DecodeJob:
 
     def run(self, patterns: list[str]) -> Iterator[Decoded]:
         """Read the file through."""
-        first, groups, sample = 0, self._groups(), list[Waiting]()
-        for group in groups:
-            sample.append(group)
-            if sum(own.size for own in sample) >= _SAMPLE:
-                break
+        first, groups = 0, self._groups()
+        sample = next(groups)
         self._settle_clocks(sample)
-        for group in chain(sample, groups):
+        for group in chain([sample], groups):
             self._correct(group)
             decoded = group.decoded(self.log, first, tuple(self.places))
             first += group.size
@@ -163,12 +159,11 @@ class _DecodeJob:
         waiting.ends = True
         yield waiting
 
-    def _settle_clocks(self, sample: list[Waiting]) -> None:
+    def _settle_clocks(self, sample: Waiting) -> None:
         """Judge the times of the first messages, and if they cannot be believed, those of all."""
-        arrived = [one for group in sample for part in group.parts for one in part.arrived]
+        arrived = [one for part in sample.parts for one in part.arrived]
         corrected = self._put_right(arrived)
-        ends = sample[-1].ends
-        if not ends and (corrected.times_ns or corrected.notes):
+        if not sample.ends and corrected.times_ns:
             whole = _DecodeJob(self.name, self.log, self.source)
             arrived = [one for part in whole.parts() for one in part.arrived]
             corrected = self._put_right(arrived)
@@ -269,8 +264,7 @@ class _DecodeJob:
         """Keep what the questions of clocks ask for, as long as they are open or the answer has to be applied."""
         numbers = self.numbers.setdefault(channel.topic, set())
         numbers.add(number)
-        if len(numbers) > 1:
-            part.shared.append((number, channel.topic, record))
+        part.shared.append((number, channel.topic, record))
         if self.settled and not self.records and len(numbers) == 1:
             return
         good = decoded.good

@@ -23,6 +23,8 @@ _LEAST, _STAMPED = 20, 0.99
 _WORTH_NS = SECOND_NS // 10
 #: Steps of the stamps are even if they vary by less than this share of their median, or of what those of log time do.
 _EVEN = 0.25
+#: Clocks of two computers part by less than this share of the time, and what waits changes by less than this, ns.
+_RATE, _PARTED_NS = 1e-3, SECOND_NS // 5
 #: Share of the messages that follow another at once, where they come in bursts.
 _CLOSE = 0.3
 #: A burst lasts less than this share of the time since the one before.
@@ -57,7 +59,7 @@ def by_stamps(topics: list[Arrivals]) -> Corrected:
         if topic.record.size < _LEAST or known.mean() < _STAMPED:
             continue
         log, stamp = topic.log_ns[known], topic.stamp_ns[known]
-        if not _runs_evenly(stamp, log):
+        if not _runs_evenly(stamp, log) or not _at_one_rate(stamp, log):
             continue
         transit = least_transit(log, stamp)
         waited = log - stamp - transit
@@ -89,6 +91,14 @@ def _runs_evenly(stamp_ns: Nanoseconds, log_ns: Nanoseconds) -> bool:
         return False
     (low, middle, high), (first, last) = np.quantile(step, (0.1, 0.5, 0.9)), np.quantile(came, (0.1, 0.9))
     return bool(high - low <= _EVEN * max(middle, last - first))
+
+
+def _at_one_rate(stamp_ns: Nanoseconds, log_ns: Nanoseconds) -> bool:
+    """Return whether stamps and log time pass alike: else a stamp is of a simulation, or a number of another unit."""
+    third = max(log_ns.size // 3, 1)
+    lead = log_ns - stamp_ns
+    apart = abs(float(np.median(lead[-third:]) - np.median(lead[:third])))
+    return apart <= _RATE * float(np.ptp(log_ns)) + _PARTED_NS
 
 
 def bursts(topics: list[Arrivals], log_ns: Mapping[str, Nanoseconds]) -> Corrected:

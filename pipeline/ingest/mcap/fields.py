@@ -174,7 +174,7 @@ def _elements(schema: Schema, path: str, count: int, message: bytes) -> Iterator
     if count < 0 and message:
         from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
 
-        # one more tells a list that is too long
+        # one more shows a list that is too long
         wanted = [f"{path}.{k}" for k in range(_LONGEST + 1)]
         try:
             reader = CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)

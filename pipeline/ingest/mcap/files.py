@@ -115,7 +115,7 @@ class McapFiles:
                 # 0 is no schema
                 schema = schemas.get((k, channel.schema), above + channel.schema) if channel.schema else 0
                 described[own] = replace(channel, schema=schema)
-            _give_numbers(self.channels, described, channels, k)
+            _pair(self.channels, described, channels, k)
 
 
 def _order(since_ns: list[int | None]) -> list[int]:
@@ -130,5 +130,18 @@ def _give_numbers(known: dict[int, T], new: dict[int, T], number_of: dict[tuple[
     numbers = {one: number for number, one in reversed(known.items())}
     for own, one in new.items():
         number = numbers.setdefault(one, k * _NUMBERS + own)
+        known.setdefault(number, one)
+        number_of[k, own] = number
+
+
+def _pair(
+    known: dict[int, McapChannel], new: dict[int, McapChannel], number_of: dict[tuple[int, int], int], k: int
+) -> None:
+    """Do so for channels, of which several may be the same: publishers of one topic, paired in their order."""
+    taken = {number for (file, _), number in number_of.items() if file == k}
+    for own, one in new.items():
+        free = (number for number, other in known.items() if other == one and number not in taken)
+        number = next(free, k * _NUMBERS + own)
+        taken.add(number)
         known.setdefault(number, one)
         number_of[k, own] = number

@@ -22,8 +22,6 @@ class OwnStamps:
 
     def __init__(self) -> None:
         self._routes: dict[McapChannel, Route | None] = {}
-        #: By topic, the field that was read.
-        self.fields: dict[str, str] = {}
 
     def read(self, channel: McapChannel, schema: Schema | None, payloads: Spans) -> Nanoseconds:
         """Return what messages say of when they were made.
@@ -52,7 +50,6 @@ class OwnStamps:
             except NoReaderError:
                 continue
             if np.mean(_stamps(route, payloads) != NO_TIME) >= _MOST:
-                self.fields[channel.topic] = field
                 return route
         return None
 

@@ -20,8 +20,8 @@ from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 
 #: Messages of a topic by which its clock is judged.
 _LEAST = 20
-#: The longest way to the recorder, ns.
-_LATEST_NS = SECOND_NS
+#: The longest way to the recorder, ns, and that of messages whose clock agrees with the recorder's for certain.
+_LATEST_NS, _AGREES_NS = SECOND_NS, SECOND_NS // 20
 #: A way that takes longer than this, ns, is worth a note where other topics have log time; that of a topic whose clock
 #: sends others faster if it is longer than the second. It has to be an even one: what waits is late for another reason.
 _WORTH_NS, _WORTH_ALONE_NS, _EVEN_NS = SECOND_NS // 5, SECOND_NS // 2, SECOND_NS // 10
@@ -70,11 +70,15 @@ def one_clock(topics: list[Arrivals], log_ns: dict[str, Nanoseconds]) -> Correct
         notes.append(
             f"The stamps of {', '.join(topic.source for topic in useless)} stand still: these messages have log time."
         )
-    clocks = _clocks(stamped)
+    clocks = _clocks([one for one in stamped if one.log_ns.size >= _LEAST])
+    for one in stamped:
+        if clocks and one.log_ns.size < _LEAST:
+            # too few to show a clock of their own
+            min(clocks, key=lambda clock: abs(clock[0].usual_ns - one.usual_ns)).append(one)
     names = {one.topic.source for one in stamped}
     by_log = [topic for topic in topics if topic.source not in names and topic.record.size >= _LEAST]
     of_recorder = [clock for clock in clocks if EARLY_NS <= clock[0].usual_ns <= _LATEST_NS]
-    if not stamped or (len(clocks) == 1 and not by_log):
+    if not clocks or (len(clocks) == 1 and not by_log):
         return Corrected(times, tuple(notes))
     reference = None if of_recorder else _most(clocks, log_ns)
     for clock in clocks:
@@ -92,10 +96,10 @@ def _stamped(topics: list[Arrivals], log_ns: Mapping[str, Nanoseconds]) -> tuple
     stamped, useless = [], []
     for topic in topics:
         known = topic.stamp_ns != NO_TIME
-        if np.count_nonzero(known) < _LEAST:
+        if not known.any():
             continue
         log, stamp = log_ns[topic.source][known], topic.stamp_ns[known]
-        if np.ptp(stamp) == 0 and np.ptp(log) > 0:
+        if log.size >= _LEAST and np.ptp(stamp) == 0 and np.ptp(log) > 0:
             useless.append(topic)
         else:
             stamped.append(_Stamped(topic, log, stamp, least_transit(log, stamp)))
@@ -106,7 +110,10 @@ def _clocks(stamped: list[_Stamped]) -> list[list[_Stamped]]:
     """Part topics by their clocks; the first of each takes the shortest way to the recorder."""
     clocks: list[list[_Stamped]] = []
     for one in sorted(stamped, key=lambda one: one.usual_ns):
-        if clocks and one.usual_ns - clocks[-1][0].usual_ns <= _LATEST_NS:
+        first = clocks[-1][0].usual_ns if clocks else 0
+        # one that is ahead of the recorder's is none that agrees with it
+        another = first < EARLY_NS <= one.usual_ns <= _AGREES_NS
+        if clocks and one.usual_ns - first <= _LATEST_NS and not another:
             clocks[-1].append(one)
         else:
             clocks.append([one])

@@ -9,6 +9,8 @@ from kempf.pipeline.ingest.text.times import SECOND_NS
 
 #: The least is taken over so long, ns, and over so many messages at the fewest.
 _OVER_NS, _FEWEST = 20 * SECOND_NS, 10
+#: Stamps of such a stretch that may be too far ahead.
+_WRONG = 2
 #: The earliest that a message may come, ns: clocks of two computers that are set agree so well.
 EARLY_NS = -SECOND_NS // 50
 #: Clocks that part by less than this, ns, from one stretch to another go alike.
@@ -38,8 +40,11 @@ def least_transit(log_ns: Nanoseconds, stamp_ns: Nanoseconds) -> Nanoseconds:
     lead = log_ns - stamp_ns
     lasting = max(int(np.ptp(log_ns)), 1)
     blocks = max(1, min(lasting // _OVER_NS, lead.size // _FEWEST))
-    first = np.linspace(0, lead.size, blocks + 1).astype(np.int64)[:-1]
-    least = np.minimum.reduceat(lead, first)
+    edges = np.linspace(0, lead.size, blocks + 1).astype(np.int64)
+    first = edges[:-1]
+    # not the very least: a single stamp may be wrong
+    own = (lead[begin:end] for begin, end in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+    least = np.array([np.partition(one, min(_WRONG, one.size - 1))[min(_WRONG, one.size - 1)] for one in own])
     if blocks == 1 or np.ptp(least) < _ALIKE_NS:
         return np.full(lead.size, np.sort(least)[least.size // 2])
     middle = first + np.diff(np.append(first, lead.size)) / 2

@@ -308,16 +308,20 @@ def _days(text: pl.Series) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
         )
     )
     # a day has 864 * 10^11 ns, so that its decimals stay integers
-    ns = day * DAY_NS + (part * 864 + 500) // 1_000
-    return ns, found["whole"].is_not_null().to_numpy()
+    ns, good = day * DAY_NS + (part * 864 + 500) // 1_000, found["whole"].is_not_null().to_numpy().copy()
+    for i in np.flatnonzero(~good & text.is_not_null().to_numpy()).tolist():
+        # a sign, an exponent, a bare point
+        exact = _exact(str(text[i]), 0, DAY_NS)
+        good[i], ns[i] = exact is not None, exact or 0
+    return ns, good
 
 
-def _exact(text: str, places: int) -> int | None:
+def _exact(text: str, places: int, times: int = 1) -> int | None:
     try:
         number = Decimal(text)
         if not text.isascii() or not number.is_finite() or "_" in text or number.adjusted() > 20:
             return None
-        ns = int(number.scaleb(places).to_integral_value(rounding=ROUND_HALF_EVEN))
+        ns = int((number.scaleb(places) * times).to_integral_value(rounding=ROUND_HALF_EVEN))
     except (InvalidOperation, ValueError):
         return None
     return ns if abs(ns) < _LARGEST else None
