@@ -84,7 +84,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
     logged = [s for s in kept if not without_log(s)]
     if len(logged) >= _ENOUGH:
         # over ground a stream along the course is taken for speed: beside manoeuvres with a log it only misleads
-        skipped |= {s.segment_id: "no speed through the water, unlike others" for s in kept if s not in logged}
+        skipped |= {s.segment_id: "no speed through the water, unlike others" for s in kept if without_log(s)}
         kept = logged
     kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
     noted, laden = _laden(warehouse, vessel, kept)

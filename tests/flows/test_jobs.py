@@ -80,7 +80,7 @@ def test_a_given_profile_is_laid_over_the_stored_one(stocked: Warehouse):
     assert profile.sources == vessels.current(stocked, "mariner").sources
     another = settle_vessel(stocked, "another", None, new_vessel=True)
     assert another == ("another", VesselProfile(vessel="another"))
-    with pytest.raises(UsageError, match="Neither"):
+    with pytest.raises(UsageError, match="No vessel is named"):
         settle_vessel(stocked, None, VesselProfile())
 
 
