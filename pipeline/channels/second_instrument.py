@@ -7,6 +7,7 @@ import numpy as np
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import as_read
 
 #: Within so much two instruments are alike: sentences of one receiver differ by their decimals.
 _ALIKE = {"deg": 0.1, "deg/s": 0.01, "m/s": 0.02}
@@ -41,9 +42,8 @@ def difference(name: str, chosen: Series, other: Series) -> str | None:
     more = (other.value - beside)[np.isfinite(beside)]
     if more.size < _FEWEST:
         return None
-    unit = CHANNELS[name].unit
-    if "rad" in unit:
-        more, unit = np.rad2deg(more), unit.replace("rad", "deg")
+    factor, unit = as_read(CHANNELS[name].unit)
+    more = factor * more
     if CHANNELS[name].wrap == "circle":
         # both are unwrapped, each from a turn of its own
         more = more - 360.0 * np.round(np.median(more) / 360.0)

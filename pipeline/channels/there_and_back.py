@@ -7,6 +7,7 @@ import numpy as np
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Series, written
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import as_read
 
 #: readings on either side of one: a leap of up to so many is none of their median
 _BESIDE = 2
@@ -101,6 +102,6 @@ def counted(name: str, count: int) -> str:
 def said(name: str, series: Series, found: Mask) -> str:
     """Return how many readings of a channel leap, with the first of them, in one sentence."""
     first = int(np.argmax(found))
-    unit = CHANNELS[name].unit.replace("rad", "deg")
-    shown = f"{np.rad2deg(series.value[first]):.4g} {unit} at {written(series.time_utc_ns[first])}"
+    factor, unit = as_read(CHANNELS[name].unit)
+    shown = f"{factor * series.value[first]:.4g} {unit} at {written(series.time_utc_ns[first])}"
     return f"{counted(name, int(np.count_nonzero(found)))}; the first is {shown}"

@@ -42,9 +42,7 @@ def put_right(topics: list[Arrivals], *, stamps_count: bool) -> Corrected:
     times |= together.times_ns
     notes += together.notes
     if stepped.moved:
-        times = {t.source: log[t.source] for t in by_log} | times
-        if not stamps_count:
-            times = log | times
+        times = ({t.source: log[t.source] for t in by_log} if stamps_count else log) | times
     if stamps_count:
         clocks = one_clock(waited, log)
         times |= clocks.times_ns

@@ -8,12 +8,12 @@ import numpy as np
 
 from kempf.pipeline.ingest.decoded import Nanoseconds
 from kempf.pipeline.ingest.messages.columns import Columns
+from kempf.pipeline.ingest.text.times import NS_PER, SECOND_NS
 from kempf.schemas.errors import UsageError
 from kempf.schemas.profile import TimeColumn
 
-#: Seconds since 1970 of the years in which a clock that is set may be, 2000 to 2100.
-_SINCE_S, _UNTIL_S = 946_684_800.0, 4_102_444_800.0
-_UNITS = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+#: Nanoseconds since 1970 of the years in which a clock that is set may be, 2000 to 2100.
+_SINCE_NS, _UNTIL_NS = 946_684_800 * SECOND_NS, 4_102_444_800 * SECOND_NS
 
 _FORMS = "a number with `unit: s`, ms, us, ns or d, text as in ISO 8601 without a unit, or a stamp of sec and nanosec"
 
@@ -74,6 +74,6 @@ def odd_time(columns: Columns, slot: int, time: Nanoseconds, stated: TimeColumn)
     value = float(columns.value[slot, first])
     if not np.isfinite(value):
         return OddTime("neither a number nor text", "Name a field below it, or leave 'time' out.")
-    fitting = [unit for unit, count in _UNITS.items() if _SINCE_S <= value / count <= _UNTIL_S]
+    fitting = [unit for unit, each in NS_PER.items() if unit != "d" and _SINCE_NS <= value * each <= _UNTIL_NS]
     step = f"Write `unit: {fitting[0]}` beside the column." if fitting else "Name another time, or leave 'time' out."
     return OddTime(f"{value:.0f}" if value == np.floor(value) else f"{value:.17g}", step)

@@ -7,11 +7,11 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import Nanoseconds
 from kempf.pipeline.ingest.mcap.batch import Batch
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS, CLOCK_LAST_NS
+from kempf.pipeline.ingest.text.times import NS_PER
 from kempf.schemas.profile import TimeColumn
 
 #: The times that every message has.
 TIMES = ("log_time", "publish_time")
-_NS_PER = {"ms": 1_000_000, "us": 1_000, "s": 1_000_000_000, "d": 86_400_000_000_000}
 
 
 class RecorderTime:
@@ -47,7 +47,7 @@ class RecorderTime:
             self._clock = TIMES[1]
             self.notes.append("The log times are all 0: the messages have their publish_time.")
         time = batch.log_time if self._clock == TIMES[0] else batch.publish_time
-        factor = _NS_PER.get(self._unit, 1)
+        factor = NS_PER[self._unit]
         # MCAP counts nanoseconds, and a writer that does is believed before the profile
         if factor > 1 and _is_set(time):
             self.notes.append(

@@ -14,6 +14,7 @@ from kempf.pipeline.ingest.mcap.unread import unread
 from kempf.pipeline.ingest.messages.columns import Columns, MessageReader
 from kempf.pipeline.ingest.spans import Spans
 from kempf.pipeline.ingest.text.row_times import text_instants
+from kempf.pipeline.ingest.text.times import NS_PER, SECOND_NS
 from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
 from kempf.schemas.profile import ChannelMap, TimeColumn, start_ns
 
@@ -25,7 +26,6 @@ _UNIT_WITHIN = 0.1
 
 #: What a stamp's whole seconds and nanoseconds are called: ROS 2, protobuf, ROS 1, Foxglove's JSON.
 _STAMPS = (("sec", "nanosec"), ("seconds", "nanos"), ("secs", "nsecs"), ("sec", "nsec"))
-_NS_PER = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1, "d": 86_400_000_000_000}
 _LAST = float(np.iinfo(np.int64).max)
 
 
@@ -119,15 +119,22 @@ class Route:
         time = np.full(columns.good.size, -1, dtype=np.int64)
         start = start_ns(self._time.start) if self._time.start else 0
         value, present = self._of(columns, self._clock)
-        scale = _NS_PER[self._time.unit or "s"]
+        scale = NS_PER[self._time.unit or "s"]
         with np.errstate(invalid="ignore"):
             usable = present & (value >= 0) & (value * scale + start < _LAST)
         time[usable] = _nanoseconds(value[usable], scale) + start
         for whole, rest in _STAMPS:
             (second, has_second), (nano, has_nano) = (self._of(columns, f"{self._clock}.{p}") for p in (whole, rest))
             with np.errstate(invalid="ignore"):
-                usable = has_second & has_nano & (second >= 0) & (second < _LAST / 1e9) & (nano >= 0) & (nano < 1e9)
-            time[usable] = second[usable].astype(np.int64) * 1_000_000_000 + nano[usable].astype(np.int64)
+                usable = (
+                    has_second
+                    & has_nano
+                    & (second >= 0)
+                    & (second < _LAST / SECOND_NS)
+                    & (nano >= 0)
+                    & (nano < SECOND_NS)
+                )
+            time[usable] = second[usable].astype(np.int64) * SECOND_NS + nano[usable].astype(np.int64)
         slot = self._wanted.index(self._clock)
         if self._time.unit is None and slot in columns.text:
             at, text = columns.text[slot]
