@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from bisect import bisect_right
+from collections.abc import Sequence
 from math import inf
 
 from kempf.warehouse.segments import Segment
@@ -17,27 +18,36 @@ _SAME_EXECUTE_S, _SAME_RUDDER_DEG = 0.25, 1.0
 _SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
 
 
-def once(
-    segments: Sequence[Segment], twins: Callable[[Segment, Segment], bool]
-) -> tuple[list[Segment], dict[str, str]]:
-    """Return each manoeuvre once, and why the others are left out.
+def once(segments: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:
+    """Return each manoeuvre once, see `same`, and why the others are left out.
 
     Of twins the one with the most executes stays, of those the longest, of equally long ones the first by log.
-
-    Parameters
-    ----------
-    twins : callable
-        Such as `same`; is given the later choice first.
     """
     kept: list[Segment] = []
     left: dict[str, str] = {}
+    stretches = _stretches(segments)
+    # only what shares some time is compared: a vessel may have thousands
+    kept_in: dict[int, list[Segment]] = {}
     for segment in sorted(segments, key=_first_choice):
-        twin = next((other for other in kept if twins(segment, other)), None)
+        beside = kept_in.setdefault(bisect_right(stretches, segment.start_utc_ns), [])
+        twin = next((other for other in beside if same(segment, other)), None)
         if twin is None:
             kept.append(segment)
+            beside.append(segment)
         else:
             left[segment.segment_id] = f"another log holds the same manoeuvre, {twin.segment_id}"
     return kept, left
+
+
+def _stretches(segments: Sequence[Segment]) -> list[int]:
+    """Return the beginnings of the stretches of time that segments which overlap one another cover, UTC nanoseconds."""
+    beginnings: list[int] = []
+    latest_end_ns = 0
+    for start_ns, end_ns in sorted((segment.start_utc_ns, segment.end_utc_ns) for segment in segments):
+        if not beginnings or start_ns >= latest_end_ns:
+            beginnings.append(start_ns)
+        latest_end_ns = max(latest_end_ns, end_ns)
+    return beginnings
 
 
 def _first_choice(segment: Segment) -> tuple[int, int, str, int]:

@@ -196,7 +196,7 @@ _COMPARED = (
 
 def _compared(rows: list[dict[str, Any]], manoeuvres: Mapping[str, Segment]) -> Comparable:
     """Keep of sets of one kind those that stand for themselves and can be weighed, each manoeuvre once."""
-    from kempf.warehouse.deduplicate import once, same
+    from kempf.warehouse.deduplicate import once
 
     names = {name: unit for row in rows for name, unit in _known(row).items()}
     left_out: Counter[str] = Counter()
@@ -209,7 +209,7 @@ def _compared(rows: list[dict[str, Any]], manoeuvres: Mapping[str, Segment]) -> 
         else:
             kept.append(row)
             seen.add(row["segment_ids"][0])
-    _, twins = once([manoeuvres[name] for name in sorted(seen) if name in manoeuvres], same)
+    _, twins = once([manoeuvres[name] for name in sorted(seen) if name in manoeuvres])
     if twins:
         left_out["of a manoeuvre that another log holds"] = len(twins)
         kept = [row for row in kept if row["segment_ids"][0] not in twins]

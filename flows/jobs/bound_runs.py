@@ -23,7 +23,7 @@ from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.warehouse import segments
-from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.deduplicate import same
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
@@ -167,7 +167,7 @@ def _is_seen(segment: Segment, seen: _Seen) -> bool:
             log_id == segment.log_id and start < segment.end_utc_ns and segment.start_utc_ns < end
             for log_id, start, end in seen.bounds
         )
-        or any(len(once([segment, other], same)[0]) == 1 for other in seen.found)
+        or any(same(segment, other) for other in seen.found)
     )
 
 

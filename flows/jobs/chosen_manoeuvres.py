@@ -11,7 +11,7 @@ from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import logs, notes, segments
-from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.deduplicate import once
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
@@ -76,7 +76,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
         )
     profile_sha256 = rows[max(manoeuvres, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
     # a broken-off zigzag stays: its rudder moved too
-    kept, twins = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
+    kept, twins = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256])
     skipped = left | twins
     for segment in manoeuvres:
         if rows[segment.ingest_id].profile_sha256 != profile_sha256:

@@ -19,7 +19,7 @@ from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.warehouse import history, parameter_sets, segments
-from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.deduplicate import once
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
@@ -79,7 +79,7 @@ def test_runs_of_one_stated_start_are_runs_of_their_own(tank: Warehouse) -> None
     assert len(chosen.segments) == 3 and {"run_1.csv", "run_2.csv"} < set(names)
     # to show that time alone would not do: they were put over at the same instants
     assert all(s.own_time is False for s in chosen.segments)
-    assert len(once([replace(s, detail={}) for s in chosen.segments], same)[0]) == 1
+    assert len(once([replace(s, detail={}) for s in chosen.segments])[0]) == 1
     (why,) = chosen.skipped.values()
     assert "another log holds the same manoeuvre" in why
 
@@ -142,7 +142,7 @@ def put_over(log: str, shift_s: float = 0.0, overshoots: tuple[float, ...] = (8.
     ],
 )
 def test_where_a_log_has_its_own_time_the_executes_decide(other: Segment, twins: bool) -> None:
-    kept, _ = once([put_over("a"), other], same)
+    kept, _ = once([put_over("a"), other])
     assert (len(kept) == 1) == twins
 
 
@@ -156,7 +156,7 @@ def test_where_a_log_has_its_own_time_the_executes_decide(other: Segment, twins:
     ],
 )
 def test_where_none_has_what_was_measured_decides(other: Segment, twins: bool) -> None:
-    kept, left = once([put_over("a", own_time=False), other], same)
+    kept, left = once([put_over("a", own_time=False), other])
     assert (len(kept) == 1) == twins == bool(left)
 
 
@@ -176,5 +176,5 @@ def ordered(log: str, turned_deg: float, largest_deg: float = 35.0) -> Segment:
     ],
 )
 def test_runs_of_one_programme_of_orders_are_told_apart_by_the_heading(other: Segment, twins: bool) -> None:
-    kept, left = once([ordered("a", 141.2), other], same)
+    kept, left = once([ordered("a", 141.2), other])
     assert (len(kept) == 1) == twins == bool(left)

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.deduplicate import once
 from kempf.warehouse.segments import Segment
 from tests.warehouse.samples import segment
 
@@ -58,7 +58,7 @@ def part(log: str, first: int, last: int, late_s: float = 0.0, **changes: Any) -
 def test_parts_of_one_run_are_one_and_that_with_more_executes_stays(other: Segment) -> None:
     whole = part("a", 0, 4)
     for order in permutations([whole, other]):
-        kept, left = once(order, same)
+        kept, left = once(order)
         (stays,) = kept
         assert len(stays.executes_utc_ns) == max(len(one.executes_utc_ns) for one in order)
         assert list(left.values()) == [f"another log holds the same manoeuvre, {stays.segment_id}"]
@@ -67,7 +67,7 @@ def test_parts_of_one_run_are_one_and_that_with_more_executes_stays(other: Segme
 def test_of_as_many_executes_the_longer_stays() -> None:
     longer = part("b", 1, 5, end_utc_ns=BEGIN_NS + 900 * SECOND_NS)
     for order in permutations([part("a", 0, 4), longer]):
-        assert once(order, same)[0] == [longer]
+        assert once(order)[0] == [longer]
 
 
 @pytest.mark.parametrize(
@@ -87,11 +87,11 @@ def test_of_as_many_executes_the_longer_stays() -> None:
 )
 def test_other_runs_stay_apart(other: Segment) -> None:
     for order in permutations([part("a", 0, 4), other]):
-        assert len(once(order, same)[0]) == 2
+        assert len(once(order)[0]) == 2
 
 
 def test_parts_of_runs_that_share_a_stated_start_stay_apart() -> None:
     runs = [part("a", 0, 4), part("b", 1, 5), part("c", 0, 5)]
     stated = [replace(run, detail={**run.detail, "own_time": False}) for run in runs]
-    assert len(once(stated, same)[0]) == 3
-    assert len(once(runs, same)[0]) == 1
+    assert len(once(stated)[0]) == 3
+    assert len(once(runs)[0]) == 1
