@@ -36,8 +36,12 @@ def plain(value: Any, *, name_non_finite: bool = False) -> Any:
     >>> plain({"b": (1, float("nan"))})
     {'b': [1, None]}
     """
-    if type(value) in _AS_IT_IS:
+    exact = type(value)
+    # what is read back from a table, which is nearly all, needs no search for what it might be
+    if exact in _AS_IT_IS or (exact is float and math.isfinite(value)):
         return value
+    if exact is dict or exact is list:
+        return _container(value, name_non_finite)
     for kind in (str, int):
         if isinstance(value, kind):
             return kind(value)
@@ -53,9 +57,12 @@ def _container(value: Any, name_non_finite: bool) -> dict[str, Any] | list[Any]:
     if isinstance(value, Mapping):
         if not all(isinstance(key, str) for key in value):
             raise TypeError(f"the keys of a JSON object are text, found {[k for k in value if not isinstance(k, str)]}")
-        return {str(key): plain(item, name_non_finite=name_non_finite) for key, item in value.items()}
+        return {
+            str(key): item if type(item) in _AS_IT_IS else plain(item, name_non_finite=name_non_finite)
+            for key, item in value.items()
+        }
     if isinstance(value, Sequence) and not isinstance(value, (bytes, bytearray)):
-        return [plain(item, name_non_finite=name_non_finite) for item in value]
+        return [item if type(item) in _AS_IT_IS else plain(item, name_non_finite=name_non_finite) for item in value]
     raise TypeError(f"{type(value).__name__} cannot be written as JSON")
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from json import loads
 from typing import Any
+
+from orjson import loads
 
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, evidence_from_json
 from kempf.warehouse import delta

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cache, partial
 from math import isfinite
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,8 @@ from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.notes import Note
-from kempf.warehouse.parameter_set import UPDATES, Bounds, update_in
+from kempf.warehouse.parameter_set import UPDATES, Bounds, Update, update_in
+from kempf.warehouse.remembered import remembered
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -149,6 +151,15 @@ def standing(warehouse: Warehouse, vessel: str) -> list[str]:
         ``no_warehouse``.
     """
     warehouse.require()
+    code = code_of(warehouse, "estimate")
+    return list(remembered(warehouse, _READ, ("standing", vessel, code), partial(_standing, warehouse, vessel)))
+
+
+#: tables of which it depends what of a vessel is superseded
+_READ = ("parameter_sets", "logs", "segments", "examinations", "notes")
+
+
+def _standing(warehouse: Warehouse, vessel: str) -> list[str]:
     with delta.reading(warehouse, "parameter_sets") as table:
         marked = _marked(table, vessel, _logs_of(warehouse, vessel, None), ("parameter_set_id", "start_utc_ns"))
     names: list[str] = marked.remove(marked["superseded"])["parameter_set_id"].to_list()
@@ -405,7 +416,9 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     noted = pl.col("provenance_json").str.contains('"draughts_m"', literal=True)
     converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
     rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
-    known = {row["parameter_set_id"]: _Rests(row) for row in rows}
+    # nearly all of a vessel's sets have the settings of another one
+    parts = cache(_parts)
+    known = {row["parameter_set_id"]: _Rests(row, *parts(row["settings_json"])) for row in rows}
     for basis in sorted(known.values(), key=lambda basis: basis.update.manoeuvres if basis.update else 0):
         if basis.update is not None:
             # it rests on fewer manoeuvres, so that what that one rests on is known
@@ -426,21 +439,24 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     )
 
 
+def _parts(settings_json: str) -> tuple[Update | None, str]:
+    """Return which set is brought forward by one of these settings, and the text of those that are no manoeuvre's."""
+    settings = json.loads(settings_json)
+    others = {key: value for key, value in settings.items() if key not in ("segments", UPDATES)}
+    return update_in(settings), canonical_json(others)
+
+
 class _Rests:
     """What a set rests on, and whether anything of it is superseded."""
 
-    def __init__(self, row: Mapping[str, Any]) -> None:
-        settings = json.loads(row["settings_json"])
-        self.update = update_in(settings)
+    def __init__(self, row: Mapping[str, Any], update: Update | None, settings_text: str) -> None:
+        self.update = update
         self.segments = frozenset(row["segment_ids"])
         self.superseded: bool = row["superseded"]
         self.converged: bool = row["converged"]
         #: Whether it goes by draughts that were noted.
         self.noted: bool = row["noted"]
         self._id: str = row["parameter_set_id"]
-        settings_text = canonical_json(
-            {key: value for key, value in settings.items() if key not in ("segments", UPDATES)}
-        )
         self.kind = (row["estimator"], row["model_sha256"], settings_text)
 
     def on(self, before: _Rests | None) -> None:

@@ -11,6 +11,7 @@ from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.instant import iso_utc
 
 _CONTENTS = ("model_spec", "settings", "fit", "iterations", "convergence", "provenance")
+_SEQUENCES = ("segment_ids", "log_ids", "parameters", "discrete", "noise", "covariance_names", "warnings")
 
 
 @dataclass(frozen=True)
@@ -63,27 +64,32 @@ class Inputs:
 
     def as_json(self) -> dict[str, Any]:
         """Return the inputs as JSON content; what is not finite is named, as a bound may be infinite."""
-        companions = {"companions": [vars(bounds) for bounds in self.companions]} if self.companions else {}
-        content: dict[str, Any] = plain(
-            {
-                "log_ids": self.log_ids,
-                "profile_sha256": self.profile_sha256,
-                "segments": [vars(bounds) for bounds in self.bounds],
-                **companions,
-                **({"draughts_m": dict(sorted(self.draughts_m.items()))} if self.draughts_m else {}),
-                "model": self.model_spec,
-                "estimator": self.estimator,
-                "settings": self.settings,
-                "code_version": self.code_version,
-            },
-            name_non_finite=True,
-        )
+        content: dict[str, Any] = plain(self._content, name_non_finite=True)
         return content
+
+    def canonical_json(self) -> str:
+        """Return the one JSON text of the inputs."""
+        return canonical_json(self._content, name_non_finite=True)
+
+    @property
+    def _content(self) -> dict[str, Any]:
+        companions = {"companions": [vars(bounds) for bounds in self.companions]} if self.companions else {}
+        return {
+            "log_ids": self.log_ids,
+            "profile_sha256": self.profile_sha256,
+            "segments": [vars(bounds) for bounds in self.bounds],
+            **companions,
+            **({"draughts_m": dict(sorted(self.draughts_m.items()))} if self.draughts_m else {}),
+            "model": self.model_spec,
+            "estimator": self.estimator,
+            "settings": self.settings,
+            "code_version": self.code_version,
+        }
 
 
 def parameter_set_id(inputs: Inputs) -> str:
     """Return the id of what these inputs produce: ``ps-`` and 16 hex digits of the SHA-256 of their canonical JSON."""
-    return "ps-" + sha256(canonical_json(inputs.as_json()))[:16]
+    return "ps-" + sha256(inputs.canonical_json())[:16]
 
 
 #: key of the settings of a set that brings another one forward
@@ -157,7 +163,7 @@ class ParameterSet:
     def __post_init__(self) -> None:
         for name in _CONTENTS:
             object.__setattr__(self, name, plain(getattr(self, name)))
-        for name in ("segment_ids", "log_ids", "parameters", "discrete", "noise", "covariance_names", "warnings"):
+        for name in _SEQUENCES:
             object.__setattr__(self, name, tuple(getattr(self, name)))
         rows = tuple(tuple(float(x) for x in row) for row in self.covariance)
         object.__setattr__(self, "covariance", rows)
@@ -168,6 +174,20 @@ class ParameterSet:
             names = [estimate.name for estimate in getattr(self, group)]
             if len(set(names)) != len(names):
                 raise ValueError(f"{group} share a name: {names}")
+
+    @classmethod
+    def restored(cls, **columns: Any) -> ParameterSet:
+        """Make a set of what was stored of one: that was checked and made plain then, as costs too much for hundreds.
+
+        Parameters
+        ----------
+        columns
+            Every field; sequences may be lists.
+        """
+        parameter_set = cls.__new__(cls)
+        rows = {name: tuple(columns[name]) for name in _SEQUENCES}
+        vars(parameter_set).update(columns, **rows, covariance=tuple(map(tuple, columns["covariance"])))
+        return parameter_set
 
     @property
     def unseen(self) -> frozenset[str]:

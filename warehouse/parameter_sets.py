@@ -6,15 +6,16 @@ import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from json import loads
 from typing import TYPE_CHECKING, Any
+
+from orjson import loads
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse import delta, seals
 from kempf.warehouse.agreement import content_digest, differences
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue, Update, brought_forward, update_in
+from kempf.warehouse.parameter_set import UPDATES, ParameterSet, StoredValue, Update, brought_forward, update_in
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -126,13 +127,24 @@ def _beside(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> dict[str, Par
     known = {parameter_set.parameter_set_id: parameter_set for parameter_set in sets}
     updating = [parameter_set for parameter_set in sets if parameter_set.updates]
     if updating:
-        models, estimators = (
-            sorted({getattr(parameter_set, n) for parameter_set in updating}) for n in ("model_sha256", "estimator")
-        )
-        where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
-        for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
-            known.setdefault(row["parameter_set_id"], _set(row))
+        before = _brings_forward(warehouse, sets[0].vessel)
+        wanted = {update.set for parameter_set in updating if (update := parameter_set.updates)}
+        beside: set[str] = set()
+        while wanted:
+            beside |= wanted
+            wanted = {before[name] for name in wanted if name in before} - beside
+        for parameter_set in all_as_stored(warehouse, sets[0].vessel, beside - known.keys()):
+            known[parameter_set.parameter_set_id] = parameter_set
     return known
+
+
+def _brings_forward(warehouse: Warehouse, vessel: str) -> dict[str, str]:
+    """Return which set each set of a vessel brings forward, by id, of those that do."""
+    import polars as pl
+
+    with delta.lent(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}) as lazy:
+        update = pl.col("settings_json").str.json_path_match(f"$.{UPDATES}.set")
+        return dict(lazy.select("parameter_set_id", update).drop_nulls().collect().rows())
 
 
 def _chain(parameter_set: ParameterSet, known: Mapping[str, ParameterSet]) -> tuple[list[ParameterSet], str | None]:
@@ -372,7 +384,7 @@ def _set(row: dict[str, Any]) -> ParameterSet:
     contents["model_spec"] = loads(row.pop("model_json"))
     contents |= {name: tuple(StoredValue(**item) for item in row.pop(name)) for name in _ESTIMATES}
     del row["vessel_key"]
-    return ParameterSet(**row, **contents)
+    return ParameterSet.restored(**row, **contents)
 
 
 def stored_at_ms(warehouse: Warehouse) -> dict[str, int]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
-from json import loads
 from typing import Any
+
+from orjson import loads
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import delta, logs, vessels
@@ -65,6 +66,13 @@ class Segment:
             object.__setattr__(self, name, plain(getattr(self, name)))
         object.__setattr__(self, "executes_utc_ns", tuple(int(t) for t in self.executes_utc_ns))
         object.__setattr__(self, "overshoots_deg", tuple(float(a) for a in self.overshoots_deg))
+
+    @classmethod
+    def restored(cls, **columns: Any) -> Segment:
+        """Make a segment of what was stored of one: that was made plain then, which costs too much for thousands."""
+        segment = cls.__new__(cls)
+        vars(segment).update(columns)
+        return segment
 
     @property
     def own_time(self) -> bool:
@@ -318,4 +326,5 @@ def _as_columns(segment: Segment) -> dict[str, Any]:
 def _segment(row: dict[str, Any]) -> Segment:
     contents = {name: loads(row.pop(f"{name}_json")) for name in _JSON}
     del row["vessel_key"]
-    return Segment(**row, **contents)
+    rows = {name: tuple(row.pop(name)) for name in ("executes_utc_ns", "overshoots_deg")}
+    return Segment.restored(**row, **rows, **contents)

@@ -6,10 +6,10 @@ Times are timestamps in UTC, to the microsecond. Nothing here is stored.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from json import loads
 from typing import Any
 
 import polars as pl
+from orjson import loads
 
 from kempf.warehouse import aliases, delta, examinations, history, logs, parameter_sets, said, segments, vessels
 from kempf.warehouse.store import Warehouse

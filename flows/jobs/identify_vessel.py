@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import without_log
@@ -54,8 +55,9 @@ class Request:
                 f"Take the estimator {SINGLE!r}, or a model without effects.",
             )
 
+    @cached_property
     def all_settings(self) -> dict[str, Any]:
-        """Return every setting of the estimator, defaults included; they are part of a set's identity."""
+        """Every setting of the estimator, defaults included; they are part of a set's identity."""
         if self.spec.effects:
             return effect_settings(self.spec, self.own)
         return {**default_settings(self.estimator), **dict(self.settings)}
@@ -281,7 +283,7 @@ def inputs_of(
     code : str, optional
         Fingerprint under which the present code estimates; its own by default.
     """
-    settings = request.all_settings()
+    settings = request.all_settings
     if request.estimator in CAN and without_log(segment) and not request.spec.effects:
         settings = {**settings, KEY: no_log_settings(dict(request.no_log))}
     return Inputs(

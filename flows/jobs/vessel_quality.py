@@ -56,15 +56,16 @@ def _of_logs(warehouse: Warehouse, vessel: str, manoeuvres: Iterable[segments.Se
     # a circle or a spiral is not fitted and is not for nothing: models are held against it
     with_manoeuvres = {manoeuvre.ingest_id for manoeuvre in manoeuvres}
     rows = logs.current(warehouse, vessel)
-    by_ingest = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
+    found = examinations.findings(warehouse, [row.ingest_id for row in rows], [vessel])
+    without = [row.ingest_id for row in rows if row.ingest_id not in with_manoeuvres]
+    examined = examinations.of_ingests(warehouse, without, [vessel])
     for row in rows:
-        examination = by_ingest.get(row.ingest_id)
-        if examination is not None:
-            yield from (
-                Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in examination.findings[:1]
-            )
+        yield from (
+            Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in found.get(row.ingest_id, ())[:1]
+        )
         if row.ingest_id in with_manoeuvres:
             continue
+        examination = examined.get(row.ingest_id)
         missing = [note for note in (examination.notes if examination else ()) if "cannot be looked for" in note]
         if missing:
             yield Finding("missing_channels", row.log_id, f"{row.file_name}: {missing[0]}.")
