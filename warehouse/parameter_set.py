@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import hypot, nan
 from typing import Any
 
@@ -254,16 +254,16 @@ def brought_forward(before: ParameterSet, added: ParameterSet) -> ParameterSet:
     rung = {**last, **{name: {**first.get(name, {}), **last.get(name, {})} for name in _OF_EACH_ON_RUNG}}
     # legs are fitted where all manoeuvres are
     rung["one_leg_ahead"] = first["one_leg_ahead"]
-    return replace(
-        added,
-        settings={**added.settings, "segments": _both(before.settings, added.settings, "segments")},
-        provenance=_both_origins(before.provenance, added.provenance),
-        segment_ids=(*before.segment_ids, *added.segment_ids),
-        log_ids=tuple(sorted({*before.log_ids, *added.log_ids})),
-        convergence=convergence,
-        fit={**added.fit, "rung": rung},
-        warnings=tuple(dict.fromkeys((*before.warnings, *added.warnings))),
-    )
+    changed = {
+        "settings": {**added.settings, "segments": _both(before.settings, added.settings, "segments")},
+        "provenance": _both_origins(before.provenance, added.provenance),
+        "segment_ids": (*before.segment_ids, *added.segment_ids),
+        "log_ids": sorted({*before.log_ids, *added.log_ids}),
+        "convergence": convergence,
+        "fit": {**added.fit, "rung": rung},
+        "warnings": dict.fromkeys((*before.warnings, *added.warnings)),
+    }
+    return ParameterSet.restored(**{**vars(added), **changed})
 
 
 def _both(before: Mapping[str, Any], added: Mapping[str, Any], key: str) -> list[Any]:
