@@ -28,6 +28,7 @@
     return head.series;
   }
 
+  const COMPASS = /heading|course/, TURNS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600];
   const named = one => one.panel.replaceAll("_", " ") + (one.kind === "measured" ? "" : `, ${one.kind}`);
 
   // measured is dots where something is predicted beside it, as in every figure
@@ -42,7 +43,7 @@
   function turned(series) {
     for (const one of series) {
       const first = values => values.find(v => v !== null), beside = series.find(other => other.panel === one.panel && other.kind === "measured");
-      if (!/heading|course/.test(one.panel) || one.kind === "measured" || !beside || first(one.y) === undefined || first(beside.y) === undefined) continue;
+      if (!COMPASS.test(one.panel) || one.kind === "measured" || !beside || first(one.y) === undefined || first(beside.y) === undefined) continue;
       const by = 2 * Math.PI * Math.round((first(one.y) - first(beside.y)) / (2 * Math.PI));
       if (by) one.y = one.y.map(v => v === null ? null : v - by);
     }
@@ -146,6 +147,12 @@
       return this.si ? [1, unit] : SHIP[unit] || [1, unit];
     }
 
+    // a line goes on through north; a person reads a heading of 500 deg as 140
+    reading(name) {
+      const compass = COMPASS.test(name) && this.unit(name)[1] === "deg";
+      return v => short(compass && v !== null && v !== undefined ? v - 360 * Math.floor(v / 360) : v);
+    }
+
     sign(name) {
       const sign = this.boxes.find(box => box.value === name).dataset.sign;
       return sign ? ` (${sign})` : "";
@@ -167,6 +174,7 @@
     panel(found, top, last) {
       const [factor, unit] = this.unit(found[0].panel), words = found[0].panel.replaceAll("_", " "), label = (unit === "1" ? words : `${words}, ${unit}`) + this.sign(found[0].panel);
       const y = found.map(one => one.y.map(v => v === null ? null : v * factor)), known = y.flat().filter(v => v !== null), total = found.reduce((sum, one) => sum + one.total, 0);
+      const reading = this.reading(found[0].panel);
       const holder = document.createElement("div");
       holder.className = "panel";
       holder.tabIndex = 0;
@@ -178,11 +186,12 @@
       const axis = { stroke: ink, grid: { stroke: faint, width: 1 }, ticks: { stroke: faint, width: 1 }, font: "12px system-ui, sans-serif" };
       const clock = (u, splits, _, __, step) => splits.map(s => iso(s).slice(11, step < 1 ? 22 : step < 60 ? 19 : 16));
       const time = last ? { ...axis, values: clock, space: 80 } : { ...axis, values: (u, splits) => splits.map(() => ""), size: 8, space: 80 };
-      const drawn = found.map(one => ({ label: found.length > 1 ? `${label}, ${one.kind}` : label, value: (_, v) => short(v), ...style(one, found.length > 1) }));
+      const drawn = found.map(one => ({ label: found.length > 1 ? `${label}, ${one.kind}` : label, value: (_, v) => reading(v), ...style(one, found.length > 1) }));
+      const level = unit === "deg" && COMPASS.test(found[0].panel) ? { values: (u, splits) => splits.map(reading), incrs: TURNS, space: 20 } : {};
       const plot = new uPlot({
         width: Math.max(200, this.panels.clientWidth), height: (last ? 150 : 124) + (top ? NAMES : 0), padding: [top ? NAMES : null, null, null, null], tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
         scales: { x: { time: true, range: () => this.span } },
-        axes: [time, { ...axis, size: 64, space: 24 }],
+        axes: [time, { ...axis, size: 64, space: 24, ...level }],
         series: [{ label: "UTC", value: (_, s) => s === null || s === undefined ? "-" : iso(s).slice(11, 23) }, ...drawn],
         cursor: { sync: { key: `chart ${this.number}` }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.do("all") } },
         hooks: {
@@ -369,7 +378,8 @@
         name.textContent = named(one);
         row.append(name);
         const apart = first === null || second === null ? null : second - first;
-        const cells = [unit, ...(now === null ? [] : [short(here)]), ...(a === null ? [] : [short(first)]), ...(b === null ? [] : [short(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? short(sum(1)) : "zoom in", whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)];
+        const reading = this.reading(one.panel);
+        const cells = [unit, ...(now === null ? [] : [reading(here)]), ...(a === null ? [] : [reading(first)]), ...(b === null ? [] : [reading(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? short(sum(1)) : "zoom in", whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)];
         for (const words of cells) row.insertCell().textContent = words;
       }
       this.readout.replaceChildren(table);
