@@ -72,12 +72,6 @@ def withdraw(warehouse: Warehouse) -> list[Equivalent]:
     return entries
 
 
-def all_of(warehouse: Warehouse) -> list[Equivalent]:
-    """Return everything that was said, in order."""
-    rows = delta.read(warehouse, _TABLE).sort("number", "stage").drop("number").rows(named=True)
-    return [Equivalent(**{**row, "vessels": tuple(row["vessels"])}) for row in rows]
-
-
 def _standing(warehouse: Warehouse) -> dict[tuple[str, str], str]:
     return remembered(warehouse, (_TABLE,), "standing", partial(_read, warehouse))
 

@@ -34,7 +34,7 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class Request:
-    """What a person asks for: which model, which estimator, which of its settings differ from the defaults.
+    """What a person asks for: which model, which estimator.
 
     ``own`` are effects of the model that are not in the catalogue. ``no_log`` are the settings of
     `pipeline.estimate.no_log.identify.NoLogSettings`, for segments without a speed through the water.
@@ -42,7 +42,6 @@ class Request:
 
     spec: ModelSpec = field(default_factory=ModelSpec)
     estimator: str = "ml"
-    settings: tuple[tuple[str, Any], ...] = ()
     no_log: tuple[tuple[str, Any], ...] = ()
     own: Own = NONE_OF_ONES_OWN
 
@@ -58,7 +57,7 @@ class Request:
         """Return every setting of the estimator, defaults included; they are part of a set's identity."""
         if self.spec.effects:
             return effect_settings(self.spec, self.own)
-        return {**default_settings(self.estimator), **dict(self.settings)}
+        return default_settings(self.estimator)
 
 
 @dataclass(frozen=True)

@@ -208,7 +208,7 @@ def next_trial(
     Raises
     ------
     UsageError
-        ``parameter_unknown``; what `kempf.flows.jobs.predict_vessel.predict_vessel` raises.
+        ``parameter_unknown``; what `kempf.flows.jobs.predict_vessel.models_of_set` raises.
     NotFound
         ``no_parameter_set``, ``no_runs``.
     DataRejected

@@ -307,7 +307,7 @@ def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Wareho
     assert again.code == 0 and "nothing to adopt" in again.out
     # taken back, everything is of other code again
     taken = kempf("rerun", "--unadopt", "--warehouse", own.uri, "--json")
-    assert {one["stage"] for one in taken.json["taken_back"]} == {one.stage for one in equivalents.all_of(own)}
+    assert {one["stage"] for one in taken.json["taken_back"]} == set(delta.read(own, "equivalents")["stage"])
     assert said_of_vessel(own, "mariner") is not None
     assert "nothing to take back" in kempf("rerun", "--unadopt", "--warehouse", own.uri).out
 
@@ -335,7 +335,7 @@ def test_a_search_that_finds_something_else_is_named_and_not_adopted(own: Wareho
     assert found.logs_otherwise == (rows[0].file_name,)
     with pytest.raises(KempfError) as caught:
         adopt_code(own, [found])
-    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    assert caught.value.code == "code_moves" and delta.read(own, "equivalents").is_empty()
     output = kempf("rerun", "--all", "--preview", "--warehouse", own.uri)
     assert f"in 1 of 2 logs other things are read or found: {rows[0].file_name}" in output.out
 
@@ -366,5 +366,5 @@ def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: p
     moving = replace(found, gone=("ps-1",))
     with pytest.raises(KempfError) as caught:
         adopt_code(own, [moving])
-    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    assert caught.value.code == "code_moves" and delta.read(own, "equivalents").is_empty()
     assert kempf("rerun", "--all", "--adopt", "--warehouse", own.uri).code == 2

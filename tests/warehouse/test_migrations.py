@@ -49,7 +49,7 @@ def _earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for one in (*given, delivery("boreas", b"june", readings=june)):
             deposit(warehouse, [one])
     warehouse.mark(Marker(2))
-    table_cache.forget()
+    table_cache._kept.clear()
     return folder
 
 

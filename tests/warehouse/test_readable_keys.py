@@ -105,7 +105,7 @@ def _layout_3(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 delta.replace(table, "lost", [one], f"vessel = '{vessel}'")
         purges.add(warehouse, purges.Purge("aurora", "e" * 64, "gone.csv", 1, 2, 3, 4, "end of the charter"))
     warehouse.mark(Marker(3))
-    table_cache.forget()
+    table_cache._kept.clear()
     return folder
 
 

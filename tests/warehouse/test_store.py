@@ -258,7 +258,7 @@ def test_a_table_log_that_is_no_log_is_named_without_what_the_library_adds(wareh
     assert warehouse.folder is not None
     rmtree(warehouse.folder / "runs" / "_seals")
     (warehouse.folder / "runs" / "_delta_log" / f"{1:020d}.json").write_text('{"commitInfo": {')
-    table_cache.forget()
+    table_cache._kept.clear()
     with pytest.raises(KempfError) as caught:
         runs.all_runs(warehouse)
     assert caught.value.code == "table_unreadable"

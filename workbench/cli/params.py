@@ -158,7 +158,7 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_new(output, text, "--output")
+        write_new(output, text)
 
 
 @command.command("alias")

@@ -97,7 +97,7 @@ def wording_of(
         diagnosed_model=diagnosed,
         first_model=first,
         last_model=last,
-        sections=_sections(verdict, evidence, diagnosed, first, last),
+        sections=_sections(verdict, evidence, diagnosed, first),
     )
 
 
@@ -165,9 +165,7 @@ def _next_steps(
     return steps
 
 
-def _sections(
-    verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: str, last: str
-) -> dict[str, SectionWords]:
+def _sections(verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: str) -> dict[str, SectionWords]:
     claims, improved, found = verdict in CLAIMING, evidence.improved, evidence.found
     fitted = sum(not manoeuvre.held_out for manoeuvre in evidence.manoeuvres)
     by_legs = ", with the parameters fitted to legs" if evidence.by_legs else ""

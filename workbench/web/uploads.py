@@ -98,10 +98,10 @@ class Uploads:
             shutil.copyfileobj(file.file, target, _BLOCK)
         return f"{to.parent.name}/{to.name}"
 
-    def store_text(self, text: str, name: str) -> str:
-        """Keep a text that was written on a page as a file, and return its name as of one that was sent."""
+    def store_profile(self, text: str) -> str:
+        """Keep a profile that was written on a page as a file, and return its name as of one that was sent."""
         data = text.encode()
-        to = self.folder / hashlib.sha256(data).hexdigest() / name
+        to = self.folder / hashlib.sha256(data).hexdigest() / "profile.yaml"
         with whole_file(to) as passing:
             passing.write_bytes(data)
         self._forget_the_oldest()

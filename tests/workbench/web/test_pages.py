@@ -22,10 +22,10 @@ from kempf.warehouse.store import Warehouse
 from kempf.workbench.cli.entry import main
 from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.data.frames import decoded
 from kempf.workbench.web.pages.spans import spans_of_lost
 from tests.workbench.driving import environment, kempf
 from tests.workbench.web.conftest import TOKEN, client_of
+from tests.workbench.web.decoded import decoded
 
 
 def ids(client: TestClient) -> dict[str, str]:

@@ -24,8 +24,6 @@ from kempf.workbench.web.uploads import paths_of
 if TYPE_CHECKING:
     from kempf.flows.jobs.correct_segments import Planned
 
-#: instants of a moved parameter's curves
-MOST_INSTANTS = 150
 Work = Callable[[Warehouse, Path, Mapping[str, Any], Progress], dict[str, Any]]
 
 
@@ -219,7 +217,7 @@ def move(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     vessel, parameter = arguments["vessel"], arguments["parameter"]
     outcome = what_if(warehouse, vessel, parameter, arguments["set"], arguments["segment"] or None, progress)
     to = f"{of_vessel(vessel)}/what-if?" + urlencode({n: arguments[n] for n in ("parameter", "set", "segment")})
-    return {"to": to, "document": outcome.show(), "series": series_of(outcome, MOST_INSTANTS)}
+    return {"to": to, "document": outcome.show(), "series": series_of(outcome)}
 
 
 def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:

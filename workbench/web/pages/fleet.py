@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from kempf.flows.jobs.vessel_report import FLOW
 from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
@@ -15,7 +16,6 @@ from kempf.warehouse.vessel_counts import counted, vessel_counts
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages.page import Page
 
-FLOW = "reprocess"
 #: vessels, and files in quarantine, that a page shows
 MOST, MOST_FILES = 200, 20
 _OUTDATED = "her models rest on manoeuvres that count no longer"

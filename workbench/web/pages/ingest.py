@@ -45,7 +45,7 @@ def ask_with_profile(desk: Desk, failed: Job, text: str) -> Job:
     """
     if failed.kind != "ingest":
         raise UsageError("job_unknown", f"The job {failed.id} took no logs in.", "Send them from the page that does.")
-    profile = desk.uploads.store_text(text, "profile.yaml")
+    profile = desk.uploads.store_profile(text)
     asked = failed.arguments
     return _queued(desk, asked["files"], [*asked["profile"], profile], asked["vessel"], asked["new_vessel"])
 
