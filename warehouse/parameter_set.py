@@ -190,9 +190,9 @@ class ParameterSet:
                 "settings": self.settings,
                 "segments": self.segment_ids,
                 "start": iso_utc(self.start_utc_ns),
-                "parameters": _by_name(self.parameters),
-                "discrete": _by_name(self.discrete),
-                "noise": _by_name(self.noise),
+                "parameters": by_name(self.parameters),
+                "discrete": by_name(self.discrete),
+                "noise": by_name(self.noise),
                 "covariance": {"names": self.covariance_names, "values": self.covariance},
                 "fit": self.fit,
                 "iterations": self.iterations,
@@ -205,7 +205,8 @@ class ParameterSet:
         return shown
 
 
-def _by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
+def by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
+    """Return value, standard error and unit of estimates by name, as JSON content."""
     return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
 
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from kempf.flows.jobs.chosen_manoeuvres import without_log
+from kempf.flows.jobs.chosen_manoeuvres import no_segments, without_log
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, as_parameter_set, without_arm
@@ -22,7 +22,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.estimators import default_settings, estimate
 from kempf.pipeline.estimate.plausibility import may_last
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
@@ -152,7 +152,7 @@ def identify_segments(
     # of the logs just listed only: another process may read one anew at any moment
     current = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
     if not current:
-        raise _no_segments(warehouse, vessel)
+        raise no_segments(vessel, logs.current(warehouse, vessel))
     table_versions = delta.versions(warehouse)
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
     tasks = _wanted(warehouse, request, readable, by_ingest)
@@ -236,18 +236,6 @@ def _identify_log(
         return _made(task.segment, parameter_set)
 
     return list(pool.map(one, tasks))
-
-
-def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
-    held = logs.current(warehouse, vessel)
-    return NotFound(
-        "no_segments",
-        f"Neither a zigzag nor a random manoeuvre was found in the {len(held)} logs of {vessel!r}, so there is nothing "
-        "to identify from.",
-        "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to which "
-        "no model is fitted.",
-        {"vessel": vessel, "logs": [row.file_name for row in held]},
-    )
 
 
 def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:

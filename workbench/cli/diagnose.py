@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
@@ -98,7 +99,7 @@ def _fleet(uri: str, *, as_json: bool) -> None:
     table = [
         [
             row["vessel"],
-            row["verdict"].replace("_", " "),
+            as_words(row["verdict"]),
             row["effects"] or "-",
             row["since"][:19] or "-",
             _percent(row["held_out_before"]),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,3 +44,15 @@ def listed_manoeuvres(warehouse: Warehouse, vessel: str | None) -> ListedManoeuv
         for segment in manoeuvres
     ]
     return ListedManoeuvres(manoeuvres, documents)
+
+
+def logs_begin_alike(manoeuvres: Iterable[tuple[str, str]]) -> bool:
+    """Return whether manoeuvres of several logs begin in the same minute, as where a logger has no calendar.
+
+    Parameters
+    ----------
+    manoeuvres : iterable of (str, str)
+        Start, ISO 8601, and log of each of a vessel's.
+    """
+    log_at: dict[str, str] = {}
+    return any(log_at.setdefault(start[:16], log) != log for start, log in manoeuvres)

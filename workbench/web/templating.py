@@ -8,7 +8,7 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from kempf.schemas.enumeration import at_the_beginning
+from kempf.schemas.enumeration import as_words, at_the_beginning
 from kempf.workbench.documents.tried import refits
 from kempf.workbench.effect_verdicts import effect_verdict
 from kempf.workbench.rungs import in_words, sized
@@ -23,11 +23,6 @@ def rendered(template: str, **content: Any) -> str:
     return _templates().get_template(template).render(**content)
 
 
-def words(name: str) -> str:
-    """Return a name of the code in words."""
-    return name.replace("_", " ")
-
-
 @cache
 def _templates() -> Environment:
     environment = Environment(
@@ -40,7 +35,7 @@ def _templates() -> Environment:
     filters: dict[str, Callable[..., Any]] = {
         "number": number,
         "minute": lambda iso: iso[:16].replace("T", " "),
-        "words": words,
+        "words": as_words,
         "error": in_words,
         "sized": sized,
         "probability": wording.probability,

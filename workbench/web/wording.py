@@ -7,6 +7,7 @@ from collections.abc import Mapping
 
 from markupsafe import Markup, escape
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.terminal import number
 
 #: What to do after an error, by its code, where a page has other means than the options of a command.
@@ -113,7 +114,7 @@ def with_unit(key: str) -> str:
     for unit in _UNITS:
         if key.endswith(f"_{unit}"):
             return f"{key.removesuffix(f'_{unit}').replace('_', ' ')}, {_UNIT_WORDS.get(unit, unit)}"
-    return key.replace("_", " ")
+    return as_words(key)
 
 
 def probability(value: float) -> str:

@@ -19,7 +19,7 @@ from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.whole_file import keep_newest, whole_file
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -109,9 +109,7 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
         columns |= {f"{name}/{MARK}{evidence}": inside for name, inside in by_run.items()}
     with whole_file(folder / f"{key}.npz") as passing, passing.open("wb") as file:
         np.savez(file, allow_pickle=False, document=np.frombuffer(document.encode(), dtype=np.uint8), **columns)
-    held = sorted(folder.glob("*.npz"), key=lambda path: (path.stat().st_mtime_ns, path.name))
-    for path in held[:-_MOST]:
-        path.unlink()
+    keep_newest(folder, "*.npz", _MOST)
 
 
 def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None) -> Asked:

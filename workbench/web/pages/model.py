@@ -9,6 +9,7 @@ import numpy as np
 
 from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.pipeline.compare.evidence import SAMPLES, Evidence, evidence_in
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import NotFound
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
@@ -72,7 +73,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
             "names": names_of(desk.warehouse, vessel),
             "short": names_of(desk.warehouse, vessel, when=False),
             "rms_channels": list(units),
-            "rms_units": [(channel.replace("_", " "), unit) for channel, unit in units.items()],
+            "rms_units": [(as_words(channel), unit) for channel, unit in units.items()],
             "runs": runs,
             "shown": shown,
             "drawn": draw_run(

@@ -8,12 +8,11 @@ from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS
 from kempf.warehouse import aliases, diagnoses, history, notes
 from kempf.workbench.documents.logs import listed_logs
-from kempf.workbench.documents.manoeuvres import listed_manoeuvres
+from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike
 from kempf.workbench.documents.parameter_sets import listed_sets
 from kempf.workbench.documents.vessel import vessel_document
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages import changes, jobs
-from kempf.workbench.web.pages.manoeuvre_names import logs_begin_alike
 from kempf.workbench.web.pages.page import Page
 
 #: entries of a list that the page shows
