@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import delta, said
+from kempf.warehouse import append_only, delta
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
 
@@ -37,7 +37,7 @@ class Purge:
 
 def add(warehouse: Warehouse, purge: Purge) -> None:
     """Write a receipt."""
-    said.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
+    append_only.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
 
 
 def of_logs(warehouse: Warehouse, log_ids: Collection[str] | None = None) -> dict[str, Purge]:

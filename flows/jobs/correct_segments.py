@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Any
 
 from kempf.flows.jobs import search_log
-from kempf.flows.jobs.following import Following, of_segments
+from kempf.flows.jobs.affected_sets import Affected, of_segments
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
@@ -36,7 +36,7 @@ class Planned:
     before: Segment | None
     after: Segment
     #: What follows for the vessel.
-    following: Following
+    affected: Affected
     _searched: SearchedLog
     _said: tuple[Correction, ...]
 
@@ -48,7 +48,7 @@ class Planned:
         if _with(before, self.correction) != before:
             corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
         # before the manoeuvres: once they are otherwise it is not seen any more what rested on them
-        if self.following.current:
+        if self.affected.current:
             aliases.withdraw(warehouse, self.log.vessel)
         # another person may have corrected the same log meanwhile
         now = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
@@ -76,7 +76,7 @@ class Planned:
             "reason": self.correction.reason,
             "before": self.before.show(self.log.file_name) if self.before else None,
             "after": self.after.show(self.log.file_name),
-            "following": self.following.show(),
+            "following": self.affected.show(),
             "doubts": list(self.doubts),
         }
 

@@ -14,9 +14,9 @@ from itertools import groupby
 from os import cpu_count
 from typing import Any
 
-from kempf.flows.fleet.state import code_of_sets
 from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
 from kempf.flows.jobs.standing_model import POOLED
+from kempf.flows.jobs.vessel_state import code_of_sets
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError

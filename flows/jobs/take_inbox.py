@@ -198,12 +198,12 @@ class _Folders:
         """Return what is to be stored of them: those that cannot be read, and those that could not before."""
         broken = [_quarantined(file, None, error, None) for file, error in self.unreadable.values()]
         bad = {row.address for row in broken}
-        mended = [
+        repaired = [
             InboxFile(file.address, file.size_bytes, file.modified_utc_ns, "ingested")
             for file in self.files.values()
             if file.address in before and file.address not in bad
         ]
-        return broken + mended
+        return broken + repaired
 
 
 def _read_folders(folder: SourceFolder, files: Sequence[SourceFile]) -> _Folders:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse import runs, said
+from kempf.warehouse import append_only, runs
 from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
@@ -123,7 +123,7 @@ def remember_history(warehouse: Warehouse, reports: Sequence[VesselReport], flow
         if report.status != "unchanged"
     ]
     if rows:
-        said.add(warehouse, "run_history", *rows)
+        append_only.add(warehouse, "run_history", *rows)
 
 
 def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:

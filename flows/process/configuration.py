@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Variable that names the file, and its name where nobody names one.
 FILE_VARIABLE, FILE = "KEMPF_CONFIG", "kempf.toml"
+#: Folder of the warehouse where nobody names one.
+DEFAULT_WAREHOUSE = "kempf-data"
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,11 @@ def setting(name: str) -> str | None:
         ``configuration_invalid``, ``secret_in_configuration``, ``log_level_unknown``.
     """
     return in_force(name).value
+
+
+def configured_warehouse() -> str:
+    """Return the address of the warehouse that is set, else the default one; errors are those of `setting`."""
+    return setting("warehouse") or DEFAULT_WAREHOUSE
 
 
 def log_level() -> str | None:

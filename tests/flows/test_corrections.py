@@ -51,7 +51,7 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     before = history.standing(warehouse, "mariner")
     assert before and not plan(warehouse, None, changed_only=True).due
     planned = plan_for(warehouse, zigzag.segment_id[:10], "exclude", "the engine was slowed down")
-    assert set(planned.following.set_ids) == set(before) and planned.following.current
+    assert set(planned.affected.set_ids) == set(before) and planned.affected.current
     assert segments.current(warehouse, "mariner") == [zigzag]  # nothing is stored yet
     planned.store(warehouse)
     assert segments.current(warehouse, "mariner") == []

@@ -12,10 +12,10 @@ from kempf.flows.fleet import plan as planning
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet import state
 from kempf.flows.fleet.plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
-from kempf.flows.fleet.state import fleet_state as state_of
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest_log
 from kempf.flows.jobs.vessel_report import VesselReport, run_id_of
+from kempf.flows.jobs.vessel_state import fleet_state as state_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.flows.fleet import state
-from kempf.flows.jobs import preview_code, rerun_all
+from kempf.flows.jobs import preview_code, rerun_all, vessel_state
 from kempf.flows.jobs.adopt_code import adopt_code
 from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
@@ -88,11 +87,11 @@ def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch:
     """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
     assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
     monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
-    state.deciding_code.cache_clear()
+    vessel_state.deciding_code.cache_clear()
     try:
         assert verify_all(own).show()["known_before"] == 0
     finally:
-        state.deciding_code.cache_clear()
+        vessel_state.deciding_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -353,11 +352,11 @@ def test_the_fleet_looks_at_every_vessel_again_when_code_was_adopted_or_taken_ba
     own: Warehouse, monkeypatch: pytest.MonkeyPatch
 ):
     other_code(monkeypatch)
-    before = state.fleet_state(own)["mariner"].digest
+    before = vessel_state.fleet_state(own)["mariner"].digest
     adopt_code(own, preview_all(own))
-    adopted = state.fleet_state(own)["mariner"].digest
+    adopted = vessel_state.fleet_state(own)["mariner"].digest
     equivalents.withdraw(own)
-    assert adopted != before == state.fleet_state(own)["mariner"].digest
+    assert adopted != before == vessel_state.fleet_state(own)["mariner"].digest
 
 
 def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: pytest.MonkeyPatch):

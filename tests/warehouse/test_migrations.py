@@ -237,11 +237,11 @@ def folders_on_disk(warehouse: Warehouse) -> set[str]:
 def test_a_damaged_marker_does_not_bring_it_forward(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     (warehouse.folder / "kempf-warehouse.json").write_text("{")
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=2)
-    assert not chain.mend_marker(warehouse)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=2)
+    assert not chain.repair_marker(warehouse)
     chain.migrate(warehouse, look)
     (warehouse.folder / "kempf-warehouse.json").unlink()
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
 
 
 def test_every_commit_is_sealed(warehouse: Warehouse) -> None:

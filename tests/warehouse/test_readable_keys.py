@@ -251,10 +251,10 @@ def test_rows_that_are_nobodys_are_refused_before_anything_changes(warehouse: Wa
 def test_a_damaged_marker_does_not_bring_it_forward(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     (warehouse.folder / "kempf-warehouse.json").write_text("{")
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=3)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=3)
     chain.migrate(warehouse, look)
     (warehouse.folder / "kempf-warehouse.json").unlink()
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
     assert {row["vessel_key"] for row in delta.read(warehouse, "aliases").rows(named=True)} == {
         vessel_key("aurora"),
         vessel_key("Åland"),

@@ -109,7 +109,7 @@ def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
         )
 
 
-def mend_marker(warehouse: Warehouse) -> bool:
+def repair_marker(warehouse: Warehouse) -> bool:
     """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
 
     A warehouse of another layout stays as it is. The tables tell which layout they have; where they have an earlier

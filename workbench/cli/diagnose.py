@@ -14,8 +14,9 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.effect_verdicts import effect_verdict
+from kempf.workbench.numbers import number, percent
 from kempf.workbench.rungs import compared, first_model
-from kempf.workbench.terminal import counted, number, print_json, print_table, progress_bar
+from kempf.workbench.terminal import counted, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse
@@ -102,18 +103,14 @@ def _fleet(uri: str, *, as_json: bool) -> None:
             as_words(row["verdict"]),
             row["effects"] or "-",
             row["since"][:19] or "-",
-            _percent(row["held_out_before"]),
-            _percent(row["held_out_after"]),
+            percent(row["held_out_before"]),
+            percent(row["held_out_after"]),
             row["note"],
         ]
         for row in rows
     ]
     head = ["vessel", "verdict", "lacks", "since UTC", "held out, %", "after", "note"]
     print_table(head, table, "What the models of the fleet lack")
-
-
-def _percent(share: float | None) -> str:
-    return "-" if share is None else number(100 * share, 3)
 
 
 def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:

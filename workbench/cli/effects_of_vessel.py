@@ -14,9 +14,10 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.documents.tried import refits
+from kempf.workbench.numbers import number
 from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.rungs import by_manoeuvre, compared, in_words
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
+from kempf.workbench.terminal import print_json, print_note, print_table, progress_bar
 
 
 @click.command("try", cls=GivenOnce)

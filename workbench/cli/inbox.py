@@ -41,7 +41,7 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     from kempf.schemas.errors import UsageError
     from kempf.warehouse.source_folder import SourceFolder
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.cli.ingest import tell_outcomes
+    from kempf.workbench.cli.ingest import print_outcomes
 
     place = folder or setting("inbox")
     if place is None:
@@ -55,7 +55,7 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     if as_json:
         print_json(run.show())
     else:
-        tell_outcomes(run.ingested, verbose=verbose)
+        print_outcomes(run.ingested, verbose=verbose)
         _print_run(run)
     if run.quarantined:
         raise click.exceptions.Exit(NeedsAPerson.exit_code)

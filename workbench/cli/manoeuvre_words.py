@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from kempf.workbench.manoeuvre_figures import FIGURES
-from kempf.workbench.terminal import number
+from kempf.workbench.numbers import number
 
 if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment

@@ -18,7 +18,8 @@ from kempf.workbench.cli.options import (
     vessel_option,
     warehouse_option,
 )
-from kempf.workbench.terminal import number, print_json, print_note, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_note, print_table
 
 if TYPE_CHECKING:
     from kempf.pipeline.estimate.result import Value
@@ -65,7 +66,7 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     from kempf.flows.jobs.leg_fit import by_name
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.parameter_set_table import tell_set
+    from kempf.workbench.parameter_set_table import print_parameter_set
 
     warehouse = Warehouse(uri)
     parameter_set = named_set(warehouse, set_id, vessel)
@@ -77,7 +78,7 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
         f"{parameter_set.parameter_set_id}: {parameter_set.vessel}, model {parameter_set.model_name}, "
         f"estimator {parameter_set.estimator}"
     )
-    tell_set(parameter_set, title, verbose=verbose, legs_too=True)
+    print_parameter_set(parameter_set, title, verbose=verbose, legs_too=True)
     print_table(
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in parameter_set.discrete],
@@ -109,7 +110,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
-    from kempf.workbench.parameter_set_table import tell_by_likelihood
+    from kempf.workbench.parameter_set_table import print_by_likelihood
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
@@ -124,7 +125,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
         words = "Without their dimension, as ships of other sizes are compared; K' and T' of the hull alone:"
         print_table(head, _difference_rows(document["nondimensional"]), words)
     for each in (one, other):
-        tell_by_likelihood(each)
+        print_by_likelihood(each)
 
 
 def _difference_rows(differences: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:

@@ -15,7 +15,8 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words, scaled
 from kempf.workbench.new_file import require_figures, writing
-from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import DataRejected, ThresholdExceeded
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.parameter_changes import Move

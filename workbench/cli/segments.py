@@ -12,7 +12,8 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli import correct_segments
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import one_line, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment

@@ -11,7 +11,8 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.steer_vessel import Steered, Tried

@@ -13,7 +13,7 @@ from markupsafe import Markup
 from kempf.schemas.enumeration import as_words
 from kempf.workbench.report import sections
 from kempf.workbench.report.content import Block, ReportContent
-from kempf.workbench.web.static_files import contents
+from kempf.workbench.static_files import contents
 
 #: what fills a section, by its anchor; `ReportWording.sections` has the order and the titles
 _BLOCKS: dict[str, Callable[[ReportContent], list[Block]]] = {

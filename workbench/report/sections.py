@@ -8,6 +8,7 @@ from typing import Any
 
 from kempf.schemas.diagnosis_evidence import FittedParameter
 from kempf.schemas.enumeration import as_words
+from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
@@ -21,11 +22,11 @@ from kempf.workbench.figures import (
     diagnosis_zigzag,
 )
 from kempf.workbench.figures.diagnosis_style import bytes_of
+from kempf.workbench.numbers import with_error
 from kempf.workbench.report.charts import chart_of
 from kempf.workbench.report.content import (
     Block,
     Cell,
-    EffectRow,
     HeadingBlock,
     PictureBlock,
     ReportContent,
@@ -34,7 +35,6 @@ from kempf.workbench.report.content import (
     TableBlock,
     TextBlock,
 )
-from kempf.workbench.report.numbers import with_error
 
 _CHANNELS = {"heading": "heading", "yaw_rate": "yaw rate", "lateral_speed": "lateral speed"}
 

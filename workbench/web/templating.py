@@ -11,8 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from kempf.schemas.enumeration import as_words, at_the_beginning
 from kempf.workbench.documents.tried import refits
 from kempf.workbench.effect_verdicts import effect_verdict
+from kempf.workbench.numbers import number, percent
 from kempf.workbench.rungs import in_words, sized
-from kempf.workbench.terminal import number
 from kempf.workbench.web import wording
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.pages.corrections import as_asked, undoing
@@ -39,7 +39,7 @@ def _templates() -> Environment:
         "error": in_words,
         "sized": sized,
         "probability": wording.probability,
-        "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
+        "percent": percent,
         "vessel_address": of_vessel,
         "as_asked": as_asked,
         "undoing": undoing,

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from markupsafe import Markup, escape
 
 from kempf.schemas.enumeration import as_words
-from kempf.workbench.terminal import number
+from kempf.workbench.numbers import number
 
 #: What to do after an error, by its code, where a page has other means than the options of a command.
 _NEXT_STEPS: Mapping[str, str] = {

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from kempf.flows.jobs.predict_request import Kind, PredictRequest, Side, angles_of, required
 from kempf.schemas.errors import UsageError
-from kempf.workbench.web.numbers import number_of
+from kempf.workbench.web.form_numbers import number_of
 
 if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.prediction import Prediction

@@ -13,7 +13,7 @@ from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.vessel_counts import counted, vessel_counts
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page
 
 #: vessels, and files in quarantine, that a page shows
@@ -21,18 +21,18 @@ MOST, MOST_FILES = 200, 20
 _OUTDATED = "her models rest on manoeuvres that count no longer"
 
 
-def document(desk: Desk) -> list[dict[str, Any]]:
+def document(app_state: AppState) -> list[dict[str, Any]]:
     """Return what `kempf vessels list --json` prints."""
-    return vessel_counts(desk.warehouse)
+    return vessel_counts(app_state.warehouse)
 
 
-def gather(desk: Desk) -> Page:
+def gather(app_state: AppState) -> Page:
     """Return the page of the fleet, vessels that need somebody first."""
-    known = diagnoses.by_vessel(desk.warehouse)
-    messages = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
-    last = {row["vessel"]: row for row in views.run_history(desk.warehouse).rows(named=True)}
+    known = diagnoses.by_vessel(app_state.warehouse)
+    messages = {run.vessel: run.message for run in runs.all_runs(app_state.warehouse, FLOW) if run.vessel is not None}
+    last = {row["vessel"]: row for row in views.run_history(app_state.warehouse).rows(named=True)}
     rows = []
-    for vessel in counted(desk.warehouse):
+    for vessel in counted(app_state.warehouse):
         message, ran = messages.get(vessel.vessel, {}), last.get(vessel.vessel)
         every = known.get(vessel.vessel, [])
         rows.append(
@@ -50,7 +50,7 @@ def gather(desk: Desk) -> Page:
             }
         )
     rows.sort(key=lambda row: (-len(row["failures"]), -len(row["findings"]), row["vessel"]))
-    quarantined = inbox.quarantined(desk.warehouse)
+    quarantined = inbox.quarantined(app_state.warehouse)
     content = {
         "rows": rows[:MOST],
         "count": len(rows),

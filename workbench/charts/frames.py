@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kempf.workbench.web.data.bins import Shown
+from kempf.workbench.charts.bins import Shown
 
 
 def encoded(start_utc_ns: int, end_utc_ns: int, shown: Mapping[str, Shown]) -> bytes:

@@ -13,7 +13,7 @@ from kempf.warehouse.store import Warehouse
 MOST_BYTES = 512 * 2**20
 
 
-class KeptChannels:
+class ChannelCache:
     """Channels by ingest, the ones that were not asked for the longest go first; the one asked for last stays."""
 
     def __init__(self, warehouse: Warehouse) -> None:
