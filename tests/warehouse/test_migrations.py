@@ -19,7 +19,7 @@ from kempf.warehouse import aliases, delta, parameter_sets, readings, seals, tab
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.keys import earlier_key
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_month, chain, to_3
+from kempf.warehouse.migrations import by_month, chain, commits, to_3
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import Problem, verify
 from tests.flows.content import seen
@@ -102,7 +102,7 @@ class Another:
 
 def before_commit(monkeypatch: pytest.MonkeyPatch, number: int, action: Callable[[], None]) -> None:
     """Let something happen right before the so-many-th commit of the migration, after it read the table."""
-    left, commit = [number], delta.append_alone
+    left, commit = [number], commits.append_alone
 
     def meanwhile(*arguments: Any, **named: Any) -> None:
         left[0] -= 1
@@ -110,7 +110,7 @@ def before_commit(monkeypatch: pytest.MonkeyPatch, number: int, action: Callable
             action()
         commit(*arguments, **named)
 
-    monkeypatch.setattr(delta, "append_alone", meanwhile)
+    monkeypatch.setattr(commits, "append_alone", meanwhile)
 
 
 def test_it_is_brought_forward_and_says_the_same(warehouse: Warehouse) -> None:
