@@ -46,7 +46,7 @@ class Note:
     #: When it was written; None before it is.
     written: datetime | None = None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the note as JSON content."""
         return {
             "number": self.number,

@@ -101,7 +101,7 @@ class Update:
     #: Manoeuvres of the first of these, which were fitted all at once.
     fitted_at_once: int
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as it stands in the settings."""
         return dict(vars(self))
 
@@ -179,7 +179,7 @@ class ParameterSet:
         """The set that this one brings forward; None where it stands by itself."""
         return update_in(self.settings)
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the parameter set as the command line's JSON object."""
         shown: dict[str, Any] = plain(
             {

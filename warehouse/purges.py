@@ -30,7 +30,7 @@ class Purge:
     evidence: int
     reason: str
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 

@@ -87,7 +87,7 @@ class Segment:
         angles = f"{self.psi0_deg:g}/{self.delta0_deg:g} " if self.is_zigzag else ""
         return angles + self.kind.replace("_", " ")
 
-    def show(self, file_name: str) -> dict[str, Any]:
+    def as_json(self, file_name: str) -> dict[str, Any]:
         """Return the segment as the command line's JSON object.
 
         Parameters

@@ -62,7 +62,7 @@ def collect(source: str, data: Path) -> Content:
         for vessel in vessels:
             for segment in segments.current(warehouse, vessel):
                 key = f"{vessel}/{segment.log_id[:12]}/{segment.start_utc_ns}"
-                found[f"segment {key}"] = _segment(segment.show(""))
+                found[f"segment {key}"] = _segment(segment.as_json(""))
             for request in requests:
                 outcomes = identify_vessel(warehouse, vessel, request)
                 pooled = pool_vessel(warehouse, vessel, request, outcomes)

@@ -57,7 +57,7 @@ def ingest_batch(warehouse: str, paths: list[str], vessel: str | None, profiles:
     files = [Path(p) for p in profiles] or list(beside)
     profile = read_profiles(files) if files else None
     outcomes = ingest_logs.ingest(Warehouse(warehouse), logs, vessel, profile)
-    return [outcome.show() for outcome in outcomes]
+    return [outcome.as_json() for outcome in outcomes]
 
 
 @task(name="take-inbox", retries=1, retry_delay_seconds=5)
@@ -99,7 +99,7 @@ def ingest(
     """
     if vessel is None and not profiles:
         runs = [inbox_task(warehouse, folder) for folder in paths]
-        outcomes = [outcome.show() for run in runs for outcome in run.ingested]
+        outcomes = [outcome.as_json() for run in runs for outcome in run.ingested]
         _show_logs(outcomes + [arrivals.in_quarantine(file) for run in runs for file in run.quarantined])
         waiting = [run for run in runs if run.quarantined]
         if waiting:
@@ -315,9 +315,9 @@ def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any])
     for vessel in vessels:
         try:
             diagnosis, _ = diagnose_vessel(Warehouse(warehouse), vessel, _model(warehouse, vessel, spec))
-            documents.append(diagnosis.show())
+            documents.append(diagnosis.as_json())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
+            documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).as_json()["error"]})
         get_run_logger().info("%s: %s", vessel, documents[-1]["verdict"])
     return documents
 

@@ -25,7 +25,7 @@ class Affected:
     #: Whether her current set is among them.
     current: bool
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "vessel": self.vessel,

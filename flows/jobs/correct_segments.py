@@ -69,14 +69,14 @@ class Planned:
             "bounds may cut a leg or enclose two manoeuvres",
         )
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "action": self.correction.action,
             "reason": self.correction.reason,
-            "before": self.before.show(self.log.file_name) if self.before else None,
-            "after": self.after.show(self.log.file_name),
-            "following": self.affected.show(),
+            "before": self.before.as_json(self.log.file_name) if self.before else None,
+            "after": self.after.as_json(self.log.file_name),
+            "following": self.affected.as_json(),
             "doubts": list(self.doubts),
         }
 

@@ -52,9 +52,9 @@ class Repaired:
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
     registers: bool = False
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        return {"done": self.done, "lost": self.gone, "left": [problem.show() for problem in self.left]}
+        return {"done": self.done, "lost": self.gone, "left": [problem.as_json() for problem in self.left]}
 
 
 def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:

@@ -234,7 +234,7 @@ class _Reprocessing:
         if work.report.segments and self.request is None:
             self._model(work)
         _withdraw(self.warehouse, work.vessel, work.report)
-        work.report.findings = [finding.show() for finding in quality_of(self.warehouse, work.vessel)]
+        work.report.findings = [finding.as_json() for finding in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
         """Bring her current model with effects up to date, or that withdrawn; where that fails it stays as it was."""

@@ -25,7 +25,7 @@ class SteeringOfSet:
     #: What speaks against these numbers, the gravest first.
     warnings: tuple[str, ...]
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         parameter_set = self.ship.parameter_set
         return {

@@ -57,11 +57,11 @@ class InboxRun:
     #: Files that were known and have not changed.
     known: int
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the run as JSON content."""
         return {
             "inbox": self.address,
-            "ingested": [outcome.show() for outcome in self.ingested],
+            "ingested": [outcome.as_json() for outcome in self.ingested],
             "quarantined": [{**quarantine_json(file), "new": file.address in self.tried} for file in self.quarantined],
             "waiting": list(self.waiting),
             "known": self.known,
@@ -84,7 +84,7 @@ class NeedsAPerson(DataRejected):
             "files_in_quarantine",
             f"{count} of {run.address} cannot be placed or read: {', '.join(names[:5])}{' ...' if names[5:] else ''}.",
             "`kempf logs quarantine` says of each why, and what to do.",
-            run.show(),
+            run.as_json(),
         )
 
 

@@ -36,7 +36,7 @@ class VesselReport:
     #: What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
     #: refused, so that the same data are refused again; ``known`` that the run before reported it already.
     failures: list[dict[str, Any]] = field(default_factory=list)
-    #: What is wrong with her logs and models as they are stored now, `kempf.flows.jobs.vessel_quality.Finding.show`.
+    #: What is wrong with her logs and models as they are stored now, `kempf.flows.jobs.vessel_quality.Finding.as_json`.
     findings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -46,14 +46,14 @@ class VesselReport:
             return "failed"
         return "changed" if self.reread or self.searched or self.new_sets else "unchanged"
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the report as JSON content."""
         return {"vessel": self.vessel, "status": self.status, **{k: v for k, v in vars(self).items() if k != "vessel"}}
 
     def fail(self, what: str, error: KempfError) -> None:
         """Write down a failure and go on."""
         lasting = isinstance(error, DataRejected)
-        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.to_json()})
+        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.as_json()})
 
     def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> FlowRun:
         """Return the line of the table ``runs``.

@@ -47,7 +47,7 @@ class Tried:
     #: Shape (n, 3). Predicted, columns `kempf.pipeline.predict.free_run.CHANNELS`; NaN where it runs away.
     predicted: Float
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content, without the series."""
         return {name: value for name, value in vars(self).items() if name != "predicted"}
 
@@ -68,7 +68,7 @@ class WhatIf:
     #: Whether the parameters are those fitted to legs, which predictions take.
     by_legs: bool = False
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
         return {
             "vessel": self.vessel,
@@ -81,7 +81,7 @@ class WhatIf:
             "std": self.std,
             "fitted_to_legs": self.by_legs,
             "others": "held as they are: fitted anew beside it, a value costs less",
-            "tried": [attempt.show() for attempt in self.tried],
+            "tried": [attempt.as_json() for attempt in self.tried],
         }
 
     def measured(self) -> dict[str, Float]:

@@ -29,7 +29,7 @@ class Setting:
     #: The variable or the file that sets it; None where nothing does.
     source: str | None
 
-    def show(self) -> dict[str, str | None]:
+    def as_json(self) -> dict[str, str | None]:
         """Return the setting as JSON content."""
         return dict(vars(self))
 

@@ -64,7 +64,7 @@ class ComparedRun:
         """The error in percent."""
         return 100.0 * self.free_run_error
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
         predicted = self.predicted
         rms = predicted.rms()

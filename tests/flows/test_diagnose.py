@@ -83,7 +83,7 @@ def test_the_command_keeps_the_keys_that_people_script_against(late: Late, diagn
 def test_what_was_diagnosed_is_not_computed_again(late: Late, diagnosed: dict[str, Any]) -> None:
     found, new = diagnose_vessel(late.warehouse, VESSEL, ModelSpec())
     assert not new and found.diagnosis_id == diagnosed["diagnosis_id"]
-    assert found.show() == diagnosed
+    assert found.as_json() == diagnosed
     text = late.kempf("diagnose", "--vessel", VESSEL)
     assert text.code == 0 and f"{VESSEL}: explained" in text.out and "next: kempf effects add rudder_lag" in text.out
 

@@ -196,19 +196,19 @@ def test_a_lost_batch_is_reported_and_tried_again_and_other_code_is_refused(own:
 
 
 def test_a_large_fleet_has_a_table_of_those_where_something_happened() -> None:
-    calm = [VesselReport(f"v{k}").show() for k in range(fleet_report.MOST_ROWS)]
+    calm = [VesselReport(f"v{k}").as_json() for k in range(fleet_report.MOST_ROWS)]
     assert len(fleet_report.table(calm)) == fleet_report.MOST_ROWS
     loud = VesselReport("loud", new_sets=1)
     loud.fail("a|b", KempfError("x", "Two\nlines.", "Do."))
-    assert [row["vessel"] for row in fleet_report.table([*calm, loud.show()])] == ["loud"]
-    assert "| loud | a\\|b: Two lines. | this run | Do. |" in fleet_report.markdown([*calm, loud.show()])
+    assert [row["vessel"] for row in fleet_report.table([*calm, loud.as_json()])] == ["loud"]
+    assert "| loud | a\\|b: Two lines. | this run | Do. |" in fleet_report.markdown([*calm, loud.as_json()])
 
 
 def test_vessels_of_a_summary_link_to_their_pages() -> None:
     reports = [VesselReport(name) for name in ("Ferry One", "loud")]
     for one in reports:
         one.fail("reading", KempfError("x", "Broken.", "Do."))
-    text = fleet_report.markdown([one.show() for one in reports], pages="http://ship:8899/")
+    text = fleet_report.markdown([one.as_json() for one in reports], pages="http://ship:8899/")
     assert "| [loud](http://ship:8899/v/loud) | reading: Broken." in text
     assert f"[Ferry One](http://ship:8899{of_vessel('Ferry One')})" in text and "/v/~ferry-one-" in text
 

@@ -78,7 +78,7 @@ def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehous
     monkeypatch.setattr(rerun_all, "rebuilt", lambda *_: pytest.fail("built again"))
     version = delta.versions(own)["runs"]
     again = verify_all(own)
-    assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
+    assert (again.counts(), again.as_json()["known_before"]) == (found.counts(), 2)
     assert delta.versions(own)["runs"] == version
     assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
 
@@ -89,7 +89,7 @@ def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch:
     monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
     vessel_state.deciding_code.cache_clear()
     try:
-        assert verify_all(own).show()["known_before"] == 0
+        assert verify_all(own).as_json()["known_before"] == 0
     finally:
         vessel_state.deciding_code.cache_clear()
 
@@ -115,7 +115,7 @@ def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: py
     found = verify_all(own)
     assert first.isdisjoint(built) and len(built) == 1
     assert found.counts() == {**NONE, "bit-identical": 2}
-    assert found.show()["known_before"] == 1
+    assert found.as_json()["known_before"] == 1
 
 
 def test_what_differs_and_what_cannot_be_built_is_reported(own: Warehouse):

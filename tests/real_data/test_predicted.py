@@ -38,7 +38,7 @@ def test_circles_are_laid_beside_predictions_in_their_own_wind_and_way(pond: Voy
     assert 0.95 < kept < 1.1
     assert std < 0.2
     # a free run is as far ahead: the comparison shows what those parameters make of it beside the likelihood's
-    compared = compare_vessel(pond.warehouse, vessel, made.parameter_set_id).show()["summary"]
+    compared = compare_vessel(pond.warehouse, vessel, made.parameter_set_id).as_json()["summary"]
     for sample in ("fitted", "held_out"):
         mean = compared[sample]
         assert mean["free_run_error_percent_fitted_to_legs"]["mean"] < 0.6 * mean["free_run_error_percent"]["mean"]

@@ -139,7 +139,7 @@ def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket)
         with pytest.raises(KempfError) as caught:
             vessels.register(warehouse, "ferry", VesselProfile(vessel="ferry"))
         assert caught.value.code in ("warehouse_unreachable", "warehouse_not_writable"), caught.value
-        assert "testing" not in json.dumps(caught.value.to_json())
+        assert "testing" not in json.dumps(caught.value.as_json())
     with pytest.raises(NotFound, match="no warehouse"):
         vessels.names(Warehouse(f"{bucket.uri}/empty", bucket.settings))
 

@@ -105,7 +105,7 @@ def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
             f"The warehouse {warehouse.uri} cannot be brought forward: {len(problems)} problems, the first: "
             f"{problems[0].words}",
             "Repair it with the version of kempf that wrote it: `kempf repair`; nothing was changed.",
-            {"problems": [problem.show() for problem in problems]},
+            {"problems": [problem.as_json() for problem in problems]},
         )
 
 

@@ -88,7 +88,7 @@ def command(
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
     for comparison, path in zip_longest(compared, figures):
-        document = comparison.show()
+        document = comparison.as_json()
         if with_where:
             document["where"] = comparison.where()
         if path is not None:

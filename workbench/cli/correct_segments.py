@@ -154,7 +154,7 @@ def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bo
     confirm(_words(planned), yes=yes)
     planned.store(warehouse)
     if as_json:
-        print_json(planned.show())
+        print_json(planned.as_json())
         return
     click.echo(f"{_words(planned)}.")
     click.echo(f"next: {command_for([planned.log.vessel])}")

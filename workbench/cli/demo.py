@@ -36,9 +36,9 @@ def command(folder: Path, as_json: bool) -> None:
                 "folder": str(shown.folder),
                 "vessel": shown.vessel,
                 "truth": shown.truth,
-                "ingested": [o.show() for o in shown.ingested],
-                "parameter_sets": [o.parameter_set.show() for o in shown.identified if o.parameter_set],
-                "reruns": [r.show() for r in shown.reruns],
+                "ingested": [o.as_json() for o in shown.ingested],
+                "parameter_sets": [o.parameter_set.as_json() for o in shown.identified if o.parameter_set],
+                "reruns": [r.as_json() for r in shown.reruns],
             }
         )
         return

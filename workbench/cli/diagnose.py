@@ -66,9 +66,9 @@ def command(
     with progress_bar() as progress:
         diagnosis, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=progress)
     if as_json:
-        print_json(diagnosis.show())
+        print_json(diagnosis.as_json())
         return
-    document = diagnosis.show()
+    document = diagnosis.as_json()
     _print_diagnosis(document, everything=everything)
     _print_at_hand(warehouse, document)
     if document["sets"]:

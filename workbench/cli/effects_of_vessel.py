@@ -117,7 +117,7 @@ def add(
     rungs = rungs_to(warehouse, parameter_set)
     if as_json:
         print_json(
-            {"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": parameter_set.show()}
+            {"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": parameter_set.as_json()}
         )
         return
     print_rungs(rungs[-2:], vessel)
@@ -181,6 +181,6 @@ def undo(vessel: str, uri: str, as_json: bool) -> None:
 
     now = go_back(Warehouse(uri), vessel)
     if as_json:
-        print_json(now.show())
+        print_json(now.as_json())
     else:
         click.echo(f"{vessel}: the current model is {now.model_name} again, {now.parameter_set_id}")

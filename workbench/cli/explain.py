@@ -32,7 +32,7 @@ def command(
 
     begin, over = utc_ns_of(start, "--from"), utc_ns_of(end, "--to")
     with progress_bar() as progress:
-        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress, segment_id).show()
+        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress, segment_id).as_json()
     if as_json:
         print_json(document)
         return

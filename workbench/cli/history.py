@@ -212,14 +212,14 @@ def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | No
 def _drawn(examined: Examined, figure: Path | None, vessel: str) -> dict[str, Any]:
     """Return what the tests say of one model and estimator, drawn where a figure is asked for."""
     if figure is None or not len(examined.history):
-        return examined.show()
+        return examined.as_json()
     from kempf.workbench.figures.history import draw_history
 
     kind = examined.kind
     title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {examined.changes.verdict}"
     with writing(figure):
         draw_history(examined.history, examined.changes, figure, title)
-    return examined.show(str(figure))
+    return examined.as_json(str(figure))
 
 
 #: Why a set is left out, of those that no history of single manoeuvres could take.

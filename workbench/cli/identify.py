@@ -62,7 +62,7 @@ def command(
         outcomes = identify_vessel(warehouse, vessel, request, progress=progress)
         pooled, alone = _pooled(warehouse, vessel, request, outcomes, progress)
     if as_json:
-        print_json([*(_show(outcome, alone) for outcome in outcomes), *([pooled.show()] if pooled else [])])
+        print_json([*(_show(outcome, alone) for outcome in outcomes), *([pooled.as_json()] if pooled else [])])
     else:
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
@@ -128,9 +128,9 @@ def _show(outcome: IdentifyOutcome, alone: dict[str, str]) -> object:
     name = outcome.segment.segment_id
     why = {"not_pooled": alone[name]} if name in alone else {}
     if outcome.parameter_set is not None:
-        return {**outcome.parameter_set.show(), **why}
+        return {**outcome.parameter_set.as_json(), **why}
     assert outcome.error is not None
-    return {"segment_id": name, **outcome.error.to_json(), **why}
+    return {"segment_id": name, **outcome.error.as_json(), **why}
 
 
 def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:

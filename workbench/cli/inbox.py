@@ -53,7 +53,7 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     with progress_bar() as progress:
         run = take_inbox(Warehouse(uri), SourceFolder(place), progress, new_vessels=new_vessel, settle_s=settle_s)
     if as_json:
-        print_json(run.show())
+        print_json(run.as_json())
     else:
         print_outcomes(run.ingested, verbose=verbose)
         _print_run(run)

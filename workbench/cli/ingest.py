@@ -60,7 +60,7 @@ def command(
     if len(outcomes) == 1 and failed:
         raise failed[0]
     if as_json:
-        print_json([outcome.show() for outcome in outcomes])
+        print_json([outcome.as_json() for outcome in outcomes])
     else:
         print_outcomes(outcomes, verbose=verbose)
         if any(outcome.segments for outcome in outcomes):

@@ -207,7 +207,7 @@ def release_file(
     profile = read_profiles(profiles) if profiles else None
     outcome = release(Warehouse(uri), file, vessel, profile, new_vessel=new_vessel)
     if as_json:
-        print_json(outcome.show())
+        print_json(outcome.as_json())
     else:
         print_outcomes([outcome], verbose=verbose)
 
@@ -248,7 +248,7 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
     confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
     affected = remove(warehouse, [row], reason)
     if as_json:
-        print_json(affected.show())
+        print_json(affected.as_json())
     else:
         click.echo(f"{one_line(row.file_name)}: removed; next: {command_for([row.vessel])}")
 
@@ -297,7 +297,7 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
         confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
     affected, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
     if as_json:
-        print_json({**facts_of(now), "following": affected.show() if affected else None})
+        print_json({**facts_of(now), "following": affected.as_json() if affected else None})
         return
     of = [vessel] if affected is None else [affected.vessel, vessel]
     again = " ".join(f"--vessel {name}" for name in of)

@@ -26,7 +26,7 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     from kempf.warehouse.store import Warehouse
 
     with progress_bar() as progress:
-        document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).show()
+        document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).as_json()
     if as_json:
         print_json(document)
         return

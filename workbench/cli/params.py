@@ -71,7 +71,7 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     parameter_set = named_set(warehouse, set_id, vessel)
     print_note(said_of_sets(warehouse, [parameter_set]))
     if as_json:
-        print_json(parameter_set.show())
+        print_json(parameter_set.as_json())
         return
     title = (
         f"{parameter_set.parameter_set_id}: {parameter_set.vessel}, model {parameter_set.model_name}, "
@@ -218,7 +218,7 @@ def steering(
     ship, judged = found.ship, found.stability
     print_note(said_of_sets(warehouse, [ship.parameter_set]))
     if as_json:
-        print_json(found.show())
+        print_json(found.as_json())
         return
     rows = [[c.name, number(c.value), number(c.std, 2), c.unit, _interval(c)] for c in found.nomoto.constants.values()]
     rows += [[p.name, number(p.value), number(p.std, 2), p.unit, "-"] for p in ship.effect_parameters]

@@ -111,7 +111,7 @@ def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | Non
 
 
 def _title(predicted: Predicted) -> str:
-    manoeuvre = predicted.show()["manoeuvre"]
+    manoeuvre = predicted.as_json()["manoeuvre"]
     kind = manoeuvre["kind"].replace("-", " ")
     words = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
     if kind == "zigzag":
@@ -124,7 +124,7 @@ def _title(predicted: Predicted) -> str:
 
 
 def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
-    shown = predicted.show()
+    shown = predicted.as_json()
     manoeuvre = shown["manoeuvre"]
     scale = predicted.basis.particulars.model_scale
     rows = [_row(name, figure, manoeuvre, scale) for name, figure in predicted.prediction.figures.items()]

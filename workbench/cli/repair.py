@@ -39,7 +39,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     if repaired:
         outcome.done.insert(0, "The file that marks the warehouse was written anew.")
     if as_json:
-        print_json(outcome.show())
+        print_json(outcome.as_json())
     else:
         for words in outcome.done:
             click.echo(one_line(words))

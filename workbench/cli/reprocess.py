@@ -56,7 +56,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
         from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 
         with progress_bar() as progress:
-            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).show()]
+            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).as_json()]
     elif os.environ.get("PREFECT_API_URL"):
         from kempf.flows.fleet.flows import reports_of
 

@@ -38,7 +38,7 @@ def command(folder: Path, as_json: bool) -> None:
             "cannot_write", f"Writing to {folder} failed: {error.strerror or error}.", "Give another folder."
         ) from error
     if as_json:
-        print_json({**reproduction.show(), "figures": [str(path) for path in figures]})
+        print_json({**reproduction.as_json(), "figures": [str(path) for path in figures]})
         return
     _print_reproduction(reproduction)
     click.echo(click.style("Figures", bold=True))
@@ -73,7 +73,7 @@ def _print_reproduction(reproduction: Reproduction) -> None:
 
 
 def _print_experiment(reproduction: Reproduction, experiment: Experiment) -> None:
-    shown = experiment.show()
+    shown = experiment.as_json()
     rows = [
         [
             name,

@@ -41,8 +41,8 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
             {
                 **_counts(previews),
                 "parameters": shown,
-                "vessels": [vessel_preview.show() for vessel_preview in previews],
-                "moves": [m.show() for m in moves],
+                "vessels": [vessel_preview.as_json() for vessel_preview in previews],
+                "moves": [m.as_json() for m in moves],
                 **({"adopted": [vars(equivalent) for equivalent in adopted]} if adopt else {}),
             }
         )

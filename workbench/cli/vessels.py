@@ -92,7 +92,7 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     confirm(what_goes(of_logs(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
     affected = remove_vessel(warehouse, name, reason)
     if as_json:
-        print_json({"vessel": name, "removed": True, "following": affected.show() if affected else None})
+        print_json({"vessel": name, "removed": True, "following": affected.as_json() if affected else None})
     else:
         click.echo(f"{name}: removed")
 

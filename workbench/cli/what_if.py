@@ -35,7 +35,7 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
     with progress_bar() as progress:
         answer = what_if(Warehouse(uri), vessel, parameter, set_id, segment_id, progress)
     if as_json:
-        print_json(answer.show())
+        print_json(answer.as_json())
         return
     rows = [
         [

@@ -37,7 +37,7 @@ def listed_manoeuvres(warehouse: Warehouse, vessel: str | None) -> ListedManoeuv
     against = marks(warehouse, vessel)
     documents = [
         {
-            **segment.show(names[segment.ingest_id]),
+            **segment.as_json(names[segment.ingest_id]),
             "channels": list(examined[segment.ingest_id].findings) if segment.ingest_id in examined else [],
             "marks": against.get(segment.segment_id, []),
         }

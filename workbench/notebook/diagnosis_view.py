@@ -43,7 +43,7 @@ class DiagnosisView:
     @cached_property
     def document(self) -> dict[str, Any]:
         """What ``kempf diagnose --json`` prints."""
-        return self.diagnosis.show()
+        return self.diagnosis.as_json()
 
     @property
     def verdict(self) -> str:

@@ -300,5 +300,5 @@ def _refused(request: Request, error: Exception) -> Response:
         traceback.print_exception(failure, file=sys.stderr)
     status = _STATUS_OF_CODE.get(failure.code, _STATUS[failure.exit_code])
     if request.url.path.endswith((".json", "/series", "/predicted")):
-        return Response(json_text(failure.to_json()) + "\n", status, media_type="application/json")
+        return Response(json_text(failure.as_json()) + "\n", status, media_type="application/json")
     return HTMLResponse(_html(request, error_page.gather(failure, status)), status)

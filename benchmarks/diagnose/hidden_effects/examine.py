@@ -42,7 +42,7 @@ def examine(folder: Path) -> dict[str, Any]:
             stored, _ = diagnose_vessel(warehouse, folder.name, ModelSpec())
             found["diagnosis"] = dict(stored.content)
         except KempfError as error:
-            found |= error.to_json()
+            found |= error.as_json()
     done = time.perf_counter()
     return found | {"seconds": {"ingest": read - begun, "diagnose": done - read}}
 

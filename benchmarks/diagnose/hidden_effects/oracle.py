@@ -60,7 +60,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
                 "std": float(fits[1].std[6 + first]),
             }
         except KempfError as error:
-            return error.to_json()
+            return error.as_json()
 
 
 def all_with_the_truth(cases: Path, truth: Mapping[str, Mapping[str, Any]], out: Path) -> None:

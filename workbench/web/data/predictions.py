@@ -101,7 +101,7 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
 
     folder = state / "predictions"
     where = comparison.where()
-    document = json.dumps({**comparison.show(), "where": where})
+    document = json.dumps({**comparison.as_json(), "where": where})
     columns: dict[str, NDArray[Any]] = {
         f"{run.name}/{name}": values for run in comparison.runs for name, values in run_series(run).items()
     }

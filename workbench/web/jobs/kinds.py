@@ -150,7 +150,7 @@ def reprocess(work: Work) -> dict[str, Any]:
 
     report = reprocess_vessel(work.warehouse, work.arguments["vessel"], progress=work.progress)
     _keep_those_of_current(work.warehouse, work.state, work.arguments["vessel"], work.progress)
-    return {"to": of_vessel(work.arguments["vessel"]), "report": report.show()}
+    return {"to": of_vessel(work.arguments["vessel"]), "report": report.as_json()}
 
 
 def ingest(work: Work) -> dict[str, Any]:
@@ -165,7 +165,7 @@ def ingest(work: Work) -> dict[str, Any]:
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(failed) == len(outcomes):
         raise _with_draft(failed[0], paths[0], work.arguments["vessel"])
-    return {"outcomes": [{**outcome.show(), "path": Path(outcome.path).name} for outcome in outcomes]}
+    return {"outcomes": [{**outcome.as_json(), "path": Path(outcome.path).name} for outcome in outcomes]}
 
 
 def _with_draft(error: KempfError, log: Path, vessel: str) -> KempfError:
@@ -182,7 +182,7 @@ def _with_draft(error: KempfError, log: Path, vessel: str) -> KempfError:
 def preview(work: Work) -> dict[str, Any]:
     """Look what a correction of a manoeuvre would change; the result is what `kempf segments` prints of it."""
     work.progress(0, 1, "looking through the log with the correction")
-    return {"planned": _planned(work.warehouse, work.arguments).show()}
+    return {"planned": _planned(work.warehouse, work.arguments).as_json()}
 
 
 def correct(work: Work) -> dict[str, Any]:
@@ -190,7 +190,7 @@ def correct(work: Work) -> dict[str, Any]:
     work.progress(0, 1, "looking through the log with the correction")
     planned = _planned(work.warehouse, work.arguments)
     planned.store(work.warehouse)
-    return {"planned": planned.show()}  # its own page says what can be done next
+    return {"planned": planned.as_json()}  # its own page says what can be done next
 
 
 def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
@@ -234,7 +234,7 @@ def what_if(work: Work) -> dict[str, Any]:
     segment_id = fields["segment"] or None
     outcome = job.what_if(work.warehouse, vessel, fields["parameter"], fields["set"], segment_id, work.progress)
     to = f"{of_vessel(vessel)}/what-if?{urlencode(fields)}"
-    return {"to": to, "document": outcome.show(), "series": job.series_of(outcome)}
+    return {"to": to, "document": outcome.as_json(), "series": job.series_of(outcome)}
 
 
 def explain(work: Work) -> dict[str, Any]:
@@ -245,7 +245,7 @@ def explain(work: Work) -> dict[str, Any]:
     named = work.arguments["segment"]
     stretch = explain_stretch(work.warehouse, vessel, begin, end, work.arguments["set"], work.progress, named)
     fields = {"set": work.arguments["set"], "from": iso_utc(begin), "to": iso_utc(end), "segment": named}
-    return {"to": f"{of_vessel(vessel)}/explain?{urlencode(fields)}", "document": stretch.show()}
+    return {"to": f"{of_vessel(vessel)}/explain?{urlencode(fields)}", "document": stretch.as_json()}
 
 
 def next_trial(work: Work) -> dict[str, Any]:
@@ -254,7 +254,7 @@ def next_trial(work: Work) -> dict[str, Any]:
 
     vessel, fields = work.arguments["vessel"], {name: work.arguments[name] for name in ("set", "parameter")}
     trial = job.next_trial(work.warehouse, vessel, fields["set"], fields["parameter"] or None, work.progress)
-    return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(fields)}", "document": trial.show()}
+    return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(fields)}", "document": trial.as_json()}
 
 
 def history_changes(work: Work) -> dict[str, Any]:
@@ -268,7 +268,7 @@ def history_changes(work: Work) -> dict[str, Any]:
     changes = []
     for done, kind in enumerate(kinds):
         work.progress(done, len(kinds), f"testing the sets of model {kind.model}, {kind.estimator}")
-        changes.append(examined(kind).show())
+        changes.append(examined(kind).as_json())
     of = history.of_vessel(work.warehouse, vessel, as_of=then)
     to = f"{of_vessel(vessel)}/changes" + (f"?{urlencode({'as_of': as_of})}" if as_of else "")
     return {"to": to, "document": changes_document(vessel, of, changes)}

@@ -29,7 +29,7 @@ def document(app_state: AppState, diagnosis_id: str) -> dict[str, Any]:
             f"No diagnosis has the id {diagnosis_id[:40]!r}.",
             "A vessel's page lists her diagnoses, and makes one.",
         )
-    return diagnosis.show()
+    return diagnosis.as_json()
 
 
 def gather(app_state: AppState, diagnosis_id: str) -> Page:

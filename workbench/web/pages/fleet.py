@@ -37,7 +37,7 @@ def gather(app_state: AppState) -> Page:
         every = known.get(vessel.vessel, [])
         rows.append(
             {
-                **vessel.show(),
+                **vessel.as_json(),
                 "fitted": vessel.effects,
                 "diagnosis": every[-1] if every else None,
                 "since": {effect: _since(every, effect) for effect in every[-1].effects} if every else {},

@@ -37,7 +37,7 @@ _MOST = 200
 def document(app_state: AppState, name: str, after: int = 0) -> dict[str, Any]:
     """Return a job and how far it was, from a tick on that is not among them."""
     job = app_state.queue.get(name)
-    shown = {**job.show(), "ticks": [tick.show() for tick in app_state.queue.ticks(name, after)]}
+    shown = {**job.as_json(), "ticks": [tick.as_json() for tick in app_state.queue.ticks(name, after)]}
     if shown["result"] is not None:
         shown["result"] = {"to": f"/jobs/{job.id}", **shown["result"]}
     return shown

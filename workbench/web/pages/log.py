@@ -39,8 +39,8 @@ def gather(app_state: AppState, log_id: str, asked_from: str | None, asked_to: s
         "log": shown,
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
-        "remarks": [note.show() for note in vessel_notes if note.subject_id == row.log_id],
-        "manoeuvres": [manoeuvre.show(row.file_name) for manoeuvre in manoeuvres],
+        "remarks": [note.as_json() for note in vessel_notes if note.subject_id == row.log_id],
+        "manoeuvres": [manoeuvre.as_json(row.file_name) for manoeuvre in manoeuvres],
         "spans": [
             *(span_of(manoeuvre) for manoeuvre in manoeuvres),
             *spans_of_lost(gone, row.start_utc_ns, row.end_utc_ns),

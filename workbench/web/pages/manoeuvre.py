@@ -61,7 +61,7 @@ def gather(app_state: AppState, segment_id: str, fields: Mapping[str, str]) -> P
         "current": current,
         "predicted": None,
         "stretch": None,
-        "notes": [note.show() for note in vessel_notes if note.subject_id == segment.segment_id],
+        "notes": [note.as_json() for note in vessel_notes if note.subject_id == segment.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }

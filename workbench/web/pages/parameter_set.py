@@ -17,7 +17,7 @@ from kempf.workbench.web.pages.page import Page
 
 def document(app_state: AppState, set_id: str) -> dict[str, Any]:
     """Return what `kempf params show ID --json` prints."""
-    return named_set(app_state.warehouse, set_id, None).show()
+    return named_set(app_state.warehouse, set_id, None).as_json()
 
 
 def gather(app_state: AppState, set_id: str) -> Page:
@@ -25,7 +25,7 @@ def gather(app_state: AppState, set_id: str) -> Page:
     parameter_set = named_set(app_state.warehouse, set_id, None)
     unseen = parameter_set.unseen
     content = {
-        "one": parameter_set.show(),
+        "one": parameter_set.as_json(),
         "names": names_of(app_state.warehouse, parameter_set.vessel),
         "fitted": [name for name in parameter_set.segment_ids if name not in unseen],
         "held_out": list(parameter_set.convergence.get("held_out") or ()),
