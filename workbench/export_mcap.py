@@ -109,7 +109,7 @@ def about(comparison: Comparison) -> dict[str, str]:
         "code_version": str(comparison.parameter_set.provenance.get("code_version", "")),
     }
     for run in comparison.runs:
-        content[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
+        content[run.name] = f"{as_words(run.sample)}; noise levels {run.levels_from}"
     return content
 
 
@@ -135,7 +135,7 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
         first = first_heading(record) if name == "heading" else None
         # a prediction is made for the moment of its measurement, a little off the grid's instant
         late = instant + np.round(record.offset_s[:, column] * SECOND_NS).astype(np.int64)
-        words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
+        words = f"{as_words(name)}, {_WORDS[unit]}"
         field = f"{name}_{unit}"
         shown = {field: _shown(factor * record.measured[:, column], first)}
         yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, shown)

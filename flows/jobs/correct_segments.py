@@ -17,6 +17,7 @@ from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, examinations, logs, segments
 from kempf.warehouse.instant import iso_utc
@@ -113,7 +114,7 @@ def plan_for(
     if action == "correct" and not segment.is_zigzag:
         raise UsageError(
             "not_a_zigzag",
-            f"{segment.segment_id} is a {segment.kind.replace('_', ' ')}; bounds are given to zigzags only.",
+            f"{segment.segment_id} is a {as_words(segment.kind)}; bounds are given to zigzags only.",
             "Exclude it with `kempf segments exclude`, or add a zigzag with `kempf segments add`.",
             {"segment_id": segment.segment_id, "kind": segment.kind},
         )
@@ -158,7 +159,7 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     if held is not None and (_subject(held) != bounds_utc_ns or _is_looked_through(warehouse, log, held)):
         raise UsageError(
             "bounds_overlap",
-            f"There is a {held.kind.replace('_', ' ')} already: {held.segment_id}, {_span(held)}"
+            f"There is a {as_words(held.kind)} already: {held.segment_id}, {_span(held)}"
             f"{', which was excluded' if held.excluded else ''}.",
             "Give it other bounds with `kempf segments correct`, or let it count with `kempf segments accept`.",
             {"segment_id": held.segment_id},

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import ThresholdExceeded, UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
@@ -222,7 +223,7 @@ def _print_where(title: str, where: dict[str, Any]) -> None:
     rows = [
         [
             _CHANNELS[group["channel"]],
-            f"{group['of'].removeprefix('by_').replace('_', ' ')}: {group['which'].replace('_', ' ')}",
+            f"{as_words(group['of'].removeprefix('by_'))}: {as_words(group['which'])}",
             f"{group['n']}",
             f"{group['whitened_rms']:.2f}",
             f"{group['band'][0]:.2f} to {group['band'][1]:.2f}",
@@ -260,7 +261,7 @@ def _print_correlation(channel: str, correlations: dict[str, Any]) -> None:
     if significant:
         name, entry = min(significant, key=lambda pair: float(pair[1]["p_adjusted"]))
         click.echo(
-            f"  {channel}: errors are correlated with {name.replace('_', ' ')} {entry['largest_lag_s']:g} s before: "
+            f"  {channel}: errors are correlated with {as_words(name)} {entry['largest_lag_s']:g} s before: "
             f"{entry['largest']:+.2f} (99 % band ±{entry['band']:.2f})"
         )
 

@@ -114,7 +114,7 @@ def _fleet(uri: str, *, as_json: bool) -> None:
 
 
 def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
-    title = f"{document['vessel']}: {document['verdict'].replace('_', ' ')}"
+    title = f"{document['vessel']}: {as_words(document['verdict'])}"
     click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
     for sentence in document["sentences"]:
         click.echo(f"  {sentence}")

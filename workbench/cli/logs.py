@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import (
@@ -117,7 +118,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     for name, value in shown.items():
         listed = value if isinstance(value, list) else [value]
         for entry in listed:
-            click.echo(f"{name.replace('_', ' ')}: {one_line(str(entry))}")
+            click.echo(f"{as_words(name)}: {one_line(str(entry))}")
     if channels is None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:

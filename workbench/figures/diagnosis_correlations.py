@@ -96,7 +96,7 @@ def describe_correlations(after: Mapping[str, Any]) -> str:
     by_pair = pairs(after)
     worst = sorted(by_pair, key=lambda key: (-by_pair[key]["outside"] / len(by_pair[key]["lag_s"]), key))[:3]
     words = "; ".join(
-        f"{channel.replace('_', ' ')} with {WORDS[other]}, {by_pair[channel, other]['outside']} of "
+        f"{as_words(channel)} with {WORDS[other]}, {by_pair[channel, other]['outside']} of "
         f"{len(by_pair[channel, other]['lag_s'])}"
         for channel, other in worst
     )

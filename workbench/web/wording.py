@@ -113,7 +113,7 @@ def with_unit(key: str) -> str:
     """
     for unit in _UNITS:
         if key.endswith(f"_{unit}"):
-            return f"{key.removesuffix(f'_{unit}').replace('_', ' ')}, {_UNIT_WORDS.get(unit, unit)}"
+            return f"{as_words(key.removesuffix(f'_{unit}'))}, {_UNIT_WORDS.get(unit, unit)}"
     return as_words(key)
 
 

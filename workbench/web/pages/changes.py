@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.schemas.enumeration import as_words
 from kempf.warehouse import history, notes
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
@@ -55,6 +56,6 @@ def content(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict
 def _said_of_figure(model: str, estimator: str) -> str:
     """Say what the figure of the parameters shows: of all models and estimators the one that most sets are of."""
     return (
-        f"Dots: parameter sets of the model {model.replace('_', ' ')}, {estimator_words(estimator)}; lines: their "
+        f"Dots: parameter sets of the model {as_words(model)}, {estimator_words(estimator)}; lines: their "
         "95 % intervals."
     )

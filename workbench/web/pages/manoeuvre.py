@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.schemas.enumeration import as_words
 from kempf.warehouse import aliases, logs, lost, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.charts.channels import derived
@@ -93,7 +94,7 @@ def _stretch(prediction: KeptPrediction, set_id: str, horizon: str, number: str)
     ways = [stretch_address(stretch, set_id, horizon, k + 1) for k, stretch in enumerate(listed)]
     stretch = listed[place]
     return {
-        "words": f"{stretch['channel'].replace('_', ' ')}, {stretch['measure']} ({stretch['sample']})",
+        "words": f"{as_words(stretch['channel'])}, {stretch['measure']} ({stretch['sample']})",
         "number": place + 1,
         "of": len(listed),
         "set": set_id,
