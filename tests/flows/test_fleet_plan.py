@@ -10,8 +10,8 @@ import pytest
 
 from kempf.flows.fleet import plan as planning
 from kempf.flows.fleet import report as fleet_report
-from kempf.flows.fleet import state
 from kempf.flows.fleet.plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
+from kempf.flows.jobs import vessel_state
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest_log
 from kempf.flows.jobs.vessel_report import VesselReport, run_id_of
@@ -80,7 +80,7 @@ def test_everything_that_a_result_rests_on_makes_her_due(own: Warehouse, ferry: 
     assert due(own) == ["idle"]
     do_fleet(own)
     assert due(own) == []
-    monkeypatch.setattr(state.code_version, "fingerprint", lambda _: "0" * 16)
+    monkeypatch.setattr(vessel_state.code_version, "fingerprint", lambda _: "0" * 16)
     assert due(own) == ["ferry", "idle"]
 
 
@@ -192,7 +192,7 @@ def test_a_lost_batch_is_reported_and_tried_again_and_other_code_is_refused(own:
     at = versions(own)
     refused = do_batch(own, ["ferry"], changed_only=True, code=["another", "version"])
     assert refused[0]["failures"][0]["error"]["code"] == "other_code" and versions(own) == at
-    assert do_batch(own, ["ferry"], changed_only=True, code=state.responsible_code())[0]["failures"] == []
+    assert do_batch(own, ["ferry"], changed_only=True, code=vessel_state.responsible_code())[0]["failures"] == []
 
 
 def test_a_large_fleet_has_a_table_of_those_where_something_happened() -> None:
