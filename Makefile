@@ -48,16 +48,17 @@ quick: lint
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
 bench: $(RIVALS)
 	for name in documents.house identify.engines identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
-		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
+		identify.monte_carlo identify.current_frame documents.draw_paper documents.draw_readme identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.trials_as_sold diagnose.hsva_ladder \
 		diagnose.hsva_folds diagnose.pond_ladder diagnose.pond_bounds diagnose.noise_hills diagnose.diagnosis_speed identify.prediction identify.circles_in_wind identify.predicted_measured ingest.doctor_measured \
 		ingest.mcap_speed ingest.nmea_speed ingest.nmea_clocks ingest.mcap_clocks fleet.adopt fleet.command_speed aims; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
-# The long ones, half an hour and more each on two cores.
+# The long ones, half an hour and more each on two cores; the last three need a Chromium.
 bench-long: $(DEVELOP)
 	for name in identify.captive_twin identify.information_limit identify.intervals_as_sold identify.changes identify.no_log identify.paper_map diagnose.hidden_effects diagnose.parted \
-		ingest.doctor fleet.fleet fleet.history_speed fleet.kill fleet.kill_dask fleet.kill_torn ingest.fuzz; \
+		diagnose.stretches identify.noisy_inputs identify.unsure_instants identify.updates ingest.doctor fleet.fleet fleet.history_speed fleet.kill fleet.kill_dask fleet.kill_torn fleet.flips fleet.one_log_more fleet.ten_nights \
+		fleet.ten_thousand ingest.fuzz documents.draw_workbench pages.drawing pages.stories; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 setup: $(DEVELOP)

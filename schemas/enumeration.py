@@ -10,6 +10,17 @@ def listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
+def as_words(name: str) -> str:
+    """Return a name of the code as words.
+
+    Examples
+    --------
+    >>> as_words("yaw_rate")
+    'yaw rate'
+    """
+    return name.replace("_", " ")
+
+
 def first_of(names: Sequence[str], most: int) -> str:
     """Return the first of some names as words, and that there are more.
 

@@ -33,7 +33,7 @@ class KempfError(Exception):
         self.next_step = next_step
         self.details = details or {}
 
-    def to_json(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the error as the JSON object of the command line."""
         return {
             "error": {

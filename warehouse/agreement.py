@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
+from kempf.warehouse.parameter_set import ParameterSet, by_name
 
 Verdict = Literal["bit-identical", "equal within tolerance", "different"]
 
@@ -94,9 +94,6 @@ _ABSENT = object()
 
 
 def _content(s: ParameterSet) -> dict[str, Any]:
-    def by_name(estimates: tuple[StoredValue, ...]) -> dict[str, Any]:
-        return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
-
     return {
         "vessel": s.vessel,
         "model": {"name": s.model_name, "spec": s.model_spec, "sha256": s.model_sha256},

@@ -49,14 +49,7 @@ def point(
     UsageError
         ``set_of_another_vessel``, ``moved_meanwhile``.
     """
-    parameter_set = parameter_sets.get(warehouse, parameter_set_id)
-    if parameter_set.vessel != vessel:
-        raise UsageError(
-            "set_of_another_vessel",
-            f"{parameter_set.parameter_set_id} is a parameter set of {parameter_set.vessel!r}, not of {vessel!r}.",
-            f"List hers with `kempf params list --vessel {vessel!r}`.",
-            {"parameter_set_id": parameter_set.parameter_set_id, "vessel": parameter_set.vessel},
-        )
+    parameter_set = parameter_sets.get_of(warehouse, parameter_set_id, vessel)
     before = {} if isinstance(expected, EllipsisType) else {(vessel, alias): expected}
     return bool(point_all(warehouse, {(vessel, alias): parameter_set.parameter_set_id}, before))
 

@@ -48,7 +48,7 @@ class Cleared:
     #: Versions that stay readable.
     kept_versions: int
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 

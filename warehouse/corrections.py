@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kempf.schemas.correction import Correction
-from kempf.warehouse import delta, said
+from kempf.warehouse import append_only, delta
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.store import Warehouse
 
@@ -27,7 +27,7 @@ class StoredCorrection:
 def add(warehouse: Warehouse, log_id: str, segment_id: str | None, correction: Correction) -> int:
     """Store a correction of a manoeuvre of a log; return its number."""
     start, end = correction.bounds_utc_ns or (None, None)
-    return said.add(
+    return append_only.add(
         warehouse,
         "corrections",
         {

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import accumulate
@@ -339,11 +339,11 @@ def replace(
     import pyarrow as pa
     from deltalake import WriterProperties, write_deltalake
 
-    schema = _as_described(table, arrow_schema(TABLES[name]))
+    schema = as_described(table, arrow_schema(TABLES[name]))
     if isinstance(new, Sequence):
         data = pa.Table.from_pylist(list(new), schema=schema)
     else:
-        data = pa.RecordBatchReader.from_batches(schema, _batches(new, schema))
+        data = pa.RecordBatchReader.from_batches(schema, batches(new, schema))
     with refusals_as_errors(table.table_uri):
         write_deltalake(
             table,
@@ -356,111 +356,7 @@ def replace(
     _log.debug("table %s: version %d is committed", name, table.version())
 
 
-def append_alone(
-    table: DeltaTable, name: str, new: Iterator[pl.DataFrame], lay_out: Mapping[str, Any] | None = None
-) -> None:
-    """Add rows in one commit on the very version that is open, or fail: no commit of another process is passed over.
-
-    Parameters
-    ----------
-    table : DeltaTable
-        From `open_table`.
-    name : str
-        Its name.
-    new : iterator of polars.DataFrame
-        New rows, with every column of the table.
-    lay_out : mapping, optional
-        Take all rows of before out and give the table the columns and folders that it has in
-        `kempf.schemas.tables.TABLES`; this is what the commit says of itself.
-
-    Raises
-    ------
-    deltalake.exceptions.CommitFailedError
-        Another process committed since the table was opened.
-    KempfError
-        ``disk_full``, ``warehouse_not_writable``.
-    """
-    schema = arrow_schema(TABLES[name])
-    schema = schema if lay_out is not None else _as_described(table, schema)
-    anew: dict[str, Any] = {"mode": "append"}
-    if lay_out is not None:
-        folders = list(TABLES[name].partition_by)
-        anew = {"mode": "overwrite", "schema_mode": "overwrite", "partition_by": folders}
-    _write_alone(table, new, schema, lay_out, **anew)
-
-
-def exchange_alone(
-    table: DeltaTable, name: str, new: Iterator[pl.DataFrame], predicate: str | None, brought_from: int
-) -> None:
-    """Exchange rows in one commit on the very version that is open, or fail, as `append_alone` does.
-
-    Parameters
-    ----------
-    table : DeltaTable
-        From `open_table`.
-    name : str
-        Its name.
-    new : iterator of polars.DataFrame
-        New rows, with every column of the table. All satisfy the predicate.
-    predicate : str or None
-        Of the rows that go, as `replace` takes it; None stands for all of them.
-    brought_from : int
-        What the commit says under `BROUGHT`.
-
-    Raises
-    ------
-    deltalake.exceptions.CommitFailedError
-        Another process committed since the table was opened.
-    KempfError
-        ``disk_full``, ``warehouse_not_writable``.
-    """
-    schema = _as_described(table, arrow_schema(TABLES[name]))
-    metadata = {BROUGHT: str(brought_from)}
-    _write_alone(table, new, schema, metadata, mode="overwrite", predicate=predicate)
-
-
-def _write_alone(
-    table: DeltaTable, new: Iterator[pl.DataFrame], schema: pa.Schema, metadata: Mapping[str, Any] | None, **how: Any
-) -> None:
-    import pyarrow as pa
-    from deltalake import CommitProperties, WriterProperties, write_deltalake
-
-    # a table with a folder a vessel has groups as large as they come
-    groups = None if table.metadata().partition_columns else ROW_GROUP
-    with refusals_as_errors(table.table_uri):
-        write_deltalake(
-            table,
-            pa.RecordBatchReader.from_batches(schema, _batches(new, schema)),
-            writer_properties=WriterProperties(compression="ZSTD", max_row_group_size=groups),
-            commit_properties=CommitProperties(custom_metadata=dict(metadata or {}) or None, max_commit_retries=0),
-            **how,
-        )
-        seals.seal(table)
-
-
-def describe_alone(table: DeltaTable, name: str, column: str, brought_from: int) -> None:
-    """Give a column the words that it has in `kempf.schemas.tables.TABLES`, as `exchange_alone` commits.
-
-    Who opened the table before cannot commit to it any more.
-
-    Raises
-    ------
-    deltalake.exceptions.CommitFailedError
-        Another process committed since the table was opened.
-    KempfError
-        ``disk_full``, ``warehouse_not_writable``.
-    """
-    from deltalake import CommitProperties
-
-    held = arrow_schema(TABLES[name]).field(column).metadata
-    properties = CommitProperties(custom_metadata={BROUGHT: str(brought_from)}, max_commit_retries=0)
-    with refusals_as_errors(table.table_uri):
-        words = {key.decode(): value.decode() for key, value in held.items()}
-        table.alter.set_column_metadata(column, words, commit_properties=properties)
-        seals.seal(table)
-
-
-def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:
+def as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:
     """Return a schema with the units and words that a table has: other words than its own no table takes."""
     import pyarrow as pa
 
@@ -468,7 +364,8 @@ def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:
     return pa.schema([field.with_metadata(held.get(field.name, field.metadata)) for field in schema])
 
 
-def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.RecordBatch]:
+def batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.RecordBatch]:
+    """Yield rows as the writer takes them, some at a time."""
     import polars as pl
 
     for frame in frames:

@@ -39,7 +39,7 @@ class StoredDiagnosis:
     inputs: Mapping[str, Any]
     code_version: str
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the diagnosis as the command line's JSON object."""
         return {
             "vessel": self.vessel,

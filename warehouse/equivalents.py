@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from kempf.warehouse import code_version, delta, said
+from kempf.warehouse import append_only, code_version, delta
 from kempf.warehouse.code_version import Stage
-from kempf.warehouse.remembered import remembered
+from kempf.warehouse.query_cache import cached
 from kempf.warehouse.store import Warehouse
 
 _TABLE = "equivalents"
@@ -56,7 +56,7 @@ def codes_of(warehouse: Warehouse) -> Codes:
 def adopt(warehouse: Warehouse, entries: Sequence[Equivalent]) -> None:
     """Let codes count as others, from now on, in one commit."""
     if entries:
-        said.add(warehouse, _TABLE, *({**vars(entry), "vessels": list(entry.vessels)} for entry in entries))
+        append_only.add(warehouse, _TABLE, *({**vars(entry), "vessels": list(entry.vessels)} for entry in entries))
 
 
 def withdraw(warehouse: Warehouse) -> list[Equivalent]:
@@ -72,14 +72,8 @@ def withdraw(warehouse: Warehouse) -> list[Equivalent]:
     return entries
 
 
-def all_of(warehouse: Warehouse) -> list[Equivalent]:
-    """Return everything that was said, in order."""
-    rows = delta.read(warehouse, _TABLE).sort("number", "stage").drop("number").rows(named=True)
-    return [Equivalent(**{**row, "vessels": tuple(row["vessels"])}) for row in rows]
-
-
 def _standing(warehouse: Warehouse) -> dict[tuple[str, str], str]:
-    return remembered(warehouse, (_TABLE,), "standing", partial(_read, warehouse))
+    return cached(warehouse, (_TABLE,), "standing", partial(_read, warehouse))
 
 
 def _read(warehouse: Warehouse) -> dict[tuple[str, str], str]:

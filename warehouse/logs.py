@@ -14,7 +14,7 @@ from kempf.pipeline.ingest.readings import Tally
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import delta
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.remembered import remembered
+from kempf.warehouse.query_cache import cached
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -48,7 +48,7 @@ def all_ingests(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]
     if vessel is None:
         return _all_ingests(warehouse, {})
     of_vessel = {"vessel_key": vessel_key(vessel)}
-    return list(remembered(warehouse, ("logs",), ("ingests", vessel), partial(_all_ingests, warehouse, of_vessel)))
+    return list(cached(warehouse, ("logs",), ("ingests", vessel), partial(_all_ingests, warehouse, of_vessel)))
 
 
 def _all_ingests(warehouse: Warehouse, where: Where) -> list[LogRow]:

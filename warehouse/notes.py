@@ -8,7 +8,7 @@ from datetime import datetime
 from typing import Any, Literal, Protocol
 
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import delta, said
+from kempf.warehouse import append_only, delta
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
@@ -46,7 +46,7 @@ class Note:
     #: When it was written; None before it is.
     written: datetime | None = None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the note as JSON content."""
         return {
             "number": self.number,
@@ -106,7 +106,7 @@ def add(
         "draught_m": draught_m,
         "text": text.strip(),
     }
-    number = said.add(warehouse, "notes", row)
+    number = append_only.add(warehouse, "notes", row)
     return Note(number, vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m, _written(warehouse, number))
 
 
@@ -124,7 +124,7 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None, as_of: datetime |
         ``no_warehouse``.
     """
     where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    when = said.times(warehouse, "notes")
+    when = append_only.times(warehouse, "notes")
     every = [
         Note(
             row["number"],
@@ -205,4 +205,4 @@ def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, flo
 
 
 def _written(warehouse: Warehouse, number: int) -> datetime | None:
-    return said.times(warehouse, "notes").get(number)
+    return append_only.times(warehouse, "notes").get(number)

@@ -107,7 +107,7 @@ class Update:
     #: Manoeuvres of the first of these, which were fitted all at once.
     fitted_at_once: int
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as it stands in the settings."""
         return dict(vars(self))
 
@@ -199,7 +199,7 @@ class ParameterSet:
         """The set that this one brings forward; None where it stands by itself."""
         return update_in(self.settings)
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the parameter set as the command line's JSON object."""
         shown: dict[str, Any] = plain(
             {
@@ -210,9 +210,9 @@ class ParameterSet:
                 "settings": self.settings,
                 "segments": self.segment_ids,
                 "start": iso_utc(self.start_utc_ns),
-                "parameters": _by_name(self.parameters),
-                "discrete": _by_name(self.discrete),
-                "noise": _by_name(self.noise),
+                "parameters": by_name(self.parameters),
+                "discrete": by_name(self.discrete),
+                "noise": by_name(self.noise),
                 "covariance": {"names": self.covariance_names, "values": self.covariance},
                 "fit": self.fit,
                 "iterations": self.iterations,
@@ -225,7 +225,8 @@ class ParameterSet:
         return shown
 
 
-def _by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
+def by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
+    """Return value, standard error and unit of estimates by name, as JSON content."""
     return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
 
 

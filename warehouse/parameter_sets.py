@@ -88,6 +88,25 @@ def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> Parameter
     return reduce(brought_forward, chain_of(warehouse, name, vessel))
 
 
+def get_of(warehouse: Warehouse, name: str, vessel: str) -> ParameterSet:
+    """Return a parameter set as `get` does, which must be one of a vessel.
+
+    Raises
+    ------
+    UsageError
+        ``set_of_another_vessel``.
+    """
+    parameter_set = get(warehouse, name)
+    if parameter_set.vessel != vessel:
+        raise UsageError(
+            "set_of_another_vessel",
+            f"{parameter_set.parameter_set_id} is a parameter set of {parameter_set.vessel!r}, not of {vessel!r}.",
+            f"List hers with `kempf params list --vessel {vessel!r}`.",
+            {"parameter_set_id": parameter_set.parameter_set_id, "vessel": parameter_set.vessel},
+        )
+    return parameter_set
+
+
 def chain_of(warehouse: Warehouse, name: str, vessel: str | None = None) -> list[ParameterSet]:
     """Return a parameter set behind those that it brings forward, the first one in front, each as it is stored.
 

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import delta, said
+from kempf.warehouse import append_only, delta
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
 
@@ -30,14 +30,14 @@ class Purge:
     evidence: int
     reason: str
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 
 
 def add(warehouse: Warehouse, purge: Purge) -> None:
     """Write a receipt."""
-    said.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
+    append_only.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
 
 
 def of_logs(warehouse: Warehouse, log_ids: Collection[str] | None = None) -> dict[str, Purge]:

@@ -321,7 +321,7 @@ def _write(path: Path, data: bytes) -> None:
         passing.write_bytes(data)
 
 
-def mend_log(folder: Path, name: str) -> list[str]:
+def repair_log(folder: Path, name: str) -> list[str]:
     """Put the commits of a table back from their sealed copies, and take away what was cut off before it counted.
 
     Returns
@@ -334,7 +334,7 @@ def mend_log(folder: Path, name: str) -> list[str]:
     for path in sorted((folder / "_delta_log").glob("*.checkpoint.parquet")):
         damage = damage_of_file(folder, name, path)
         if damage is not None and damage.what == "seal":
-            sentences += mend_seals(folder, name, [path])
+            sentences += repair_seals(folder, name, [path])
         elif damage is not None:
             # the commits are all kept: the table opens without it
             path.unlink(missing_ok=True)
@@ -360,7 +360,7 @@ def mend_log(folder: Path, name: str) -> list[str]:
     return sentences
 
 
-def mend_seals(folder: Path, name: str, paths: Iterable[Path]) -> list[str]:
+def repair_seals(folder: Path, name: str, paths: Iterable[Path]) -> list[str]:
     """Seal anew the files of a table whose seals are no whole ones."""
     sentences = []
     for path in paths:

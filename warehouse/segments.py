@@ -14,7 +14,7 @@ from kempf.warehouse import delta, logs, vessels
 from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.remembered import remembered
+from kempf.warehouse.query_cache import cached
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -95,7 +95,7 @@ class Segment:
         angles = f"{self.psi0_deg:g}/{self.delta0_deg:g} " if self.is_zigzag else ""
         return angles + self.kind.replace("_", " ")
 
-    def show(self, file_name: str) -> dict[str, Any]:
+    def as_json(self, file_name: str) -> dict[str, Any]:
         """Return the segment as the command line's JSON object.
 
         Parameters
@@ -229,7 +229,7 @@ def found_in(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
         return _found_in(warehouse, None)
     vessels.require(warehouse, vessel)
     tables = ("logs", "segments")
-    return list(remembered(warehouse, tables, ("manoeuvres", vessel), partial(_found_in, warehouse, vessel)))
+    return list(cached(warehouse, tables, ("manoeuvres", vessel), partial(_found_in, warehouse, vessel)))
 
 
 def _found_in(warehouse: Warehouse, vessel: str | None) -> list[Segment]:

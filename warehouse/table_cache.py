@@ -61,12 +61,6 @@ def borrowed(
     _keep(warehouse, name, key, table)
 
 
-def forget() -> None:
-    """Throw every handle away, as a process that begins has none."""
-    with _lock:
-        _kept.clear()
-
-
 def _key(warehouse: Warehouse, name: str) -> tuple[object, ...]:
     # handles do not survive a fork
     return (os.getpid(), warehouse.address(name), tuple(sorted((warehouse.options or {}).items())))

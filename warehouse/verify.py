@@ -34,7 +34,7 @@ class Problem:
     #: Whether the newest version of the table is not touched by it: only what was known earlier cannot be read.
     past: bool = False
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 

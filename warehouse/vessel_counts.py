@@ -24,7 +24,7 @@ class VesselCount:
     #: Whether each of her sets of several manoeuvres, of all where there is none, rests on one that counts no longer.
     outdated: bool
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {name: getattr(self, name) for name in ("vessel", "logs", "segments", "parameter_sets")}
 
@@ -76,4 +76,4 @@ def vessel_counts(warehouse: Warehouse) -> list[dict[str, Any]]:
     NotFound
         ``no_warehouse``.
     """
-    return [vessel.show() for vessel in counted(warehouse)]
+    return [vessel.as_json() for vessel in counted(warehouse)]

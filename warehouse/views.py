@@ -11,7 +11,7 @@ from typing import Any
 import polars as pl
 from orjson import loads
 
-from kempf.warehouse import aliases, delta, examinations, history, logs, parameter_sets, said, segments, vessels
+from kempf.warehouse import aliases, append_only, delta, examinations, history, logs, parameter_sets, segments, vessels
 from kempf.warehouse.store import Warehouse
 
 _TIME = pl.Datetime("us", "UTC")
@@ -186,7 +186,7 @@ def run_history(warehouse: Warehouse) -> pl.DataFrame:
 
     Columns: run_at, flow, flow_run, vessel, status, new_sets, kept_sets, reread, failures, findings, first_failure.
     """
-    times = said.times(warehouse, "run_history")
+    times = append_only.times(warehouse, "run_history")
     rows = delta.read(warehouse, "run_history").sort("number", "vessel").rows(named=True)
     content = [
         {**{key: row[key] for key in row if key != "number"}, "run_at": times.get(row["number"])} for row in rows

@@ -1,8 +1,9 @@
-"""Files that are there whole or not at all, whenever their writer is killed."""
+"""Files that are there whole or not at all, whenever their writer is killed, and how many of them are kept."""
 
 from __future__ import annotations
 
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -37,3 +38,21 @@ def whole_file(path: Path) -> Iterator[Path]:
         passing.replace(path)
     finally:
         passing.unlink(missing_ok=True)
+
+
+def keep_newest(folder: Path, pattern: str, most: int) -> None:
+    """Delete all but the newest entries of a folder that match a pattern, files or folders.
+
+    Parameters
+    ----------
+    pattern : str
+        Such as ``*.html``.
+    most : int
+        How many stay, by the time they were written, then by name.
+    """
+    entries = sorted(folder.glob(pattern), key=lambda path: (path.stat().st_mtime_ns, path.name))
+    for path in entries[:-most]:
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink()

@@ -53,7 +53,7 @@ def as_text(parameter_set: ParameterSet, form: str) -> str:
             row = [parameter_set.parameter_set_id, "fitted_to_legs", name, repr(value), repr(std), units[name]]
             writer.writerow(row)
         return stream.getvalue()
-    content = {key: value for key, value in parameter_set.show().items() if key != "iterations"}
+    content = {key: value for key, value in parameter_set.as_json().items() if key != "iterations"}
     if form == "json":
         return json.dumps(content, indent=2) + "\n"
     return str(yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False, allow_unicode=True))

@@ -20,6 +20,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.compare.run_series import first_heading, instants_utc_ns
 from kempf.pipeline.predict.prediction import WIDTH_95, Predicted
+from kempf.schemas.enumeration import as_words
 
 #: written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone
 _LIBRARY = "kempf"
@@ -108,7 +109,7 @@ def about(comparison: Comparison) -> dict[str, str]:
         "code_version": str(comparison.parameter_set.provenance.get("code_version", "")),
     }
     for run in comparison.runs:
-        content[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
+        content[run.name] = f"{as_words(run.sample)}; noise levels {run.levels_from}"
     return content
 
 
@@ -134,13 +135,15 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
         first = first_heading(record) if name == "heading" else None
         # a prediction is made for the moment of its measurement, a little off the grid's instant
         late = instant + np.round(record.offset_s[:, column] * SECOND_NS).astype(np.int64)
-        words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
+        words = f"{as_words(name)}, {_WORDS[unit]}"
         field = f"{name}_{unit}"
         shown = {field: _shown(factor * record.measured[:, column], first)}
         yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, shown)
         for horizon, prediction in (("one_step", run.predicted), ("free_run", run.free)):
             yield from _predicted(prediction, horizon, name, words, late, first)
-            topic = _topic(f"/residual/{horizon}/{name}", f"measured less predicted {words}, {_spoken(horizon)}", field)
+            topic = _topic(
+                f"/residual/{horizon}/{name}", f"measured less predicted {words}, {as_words(horizon)}", field
+            )
             yield from _series(topic, late, {field: factor * prediction.error[:, column]})
     yield from _series(
         _topic("/input/rudder", "rudder angle, deg, starboard positive", "rudder_angle_deg"),
@@ -169,17 +172,13 @@ def _shown(value: Float, first_rad: float | None) -> Float:
     return value if first_rad is None else np.mod(value + _DEG * first_rad, 360.0)
 
 
-def _spoken(horizon: str) -> str:
-    return horizon.replace("_", " ")
-
-
 def _predicted(
     prediction: Predicted, horizon: str, name: str, words: str, instant: Any, first_rad: float | None
 ) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     column, unit, factor = _CHANNELS[name]
     field = f"{name}_{unit}"
     columns = {field: _shown(factor * prediction.predicted[:, column], first_rad)}
-    properties = {field: f"predicted {words}, {_spoken(horizon)}"}
+    properties = {field: f"predicted {words}, {as_words(horizon)}"}
     if np.isfinite(prediction.std[:, column]).any():
         half = WIDTH_95 * factor * prediction.std[:, column]
         columns |= {"low_95": columns[field] - half, "high_95": columns[field] + half}

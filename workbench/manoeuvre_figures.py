@@ -1,4 +1,4 @@
-"""Figures of a predicted manoeuvre in words, as the command line and the pages have them."""
+"""Figures of a manoeuvre in words, measured or predicted, as the command line and the pages have them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ FIGURES = {
     "initial_turning_m": ("distance to the second execute", "m"),
     "time_to_second_execute_s": ("time to the second execute", "s"),
     "period_s": ("period", "s"),
-    "residual_yaw_rate_deg_s": ("yaw rate that is left", "deg/s"),
+    "initial_yaw_rate_deg_s": ("yaw rate of the turn", "deg/s"),
+    "residual_yaw_rate_deg_s": ("residual yaw rate", "deg/s"),
     "residual_share_percent": ("share of the rate that is left", "%"),
     "time_to_half_s": ("time to half the rate", "s"),
     "loop_width_deg": ("width of the loop", "deg"),

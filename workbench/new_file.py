@@ -71,22 +71,20 @@ def writing(path: Path, option: str = "--figure") -> Iterator[None]:
         raise _cannot_write(path, error.strerror or str(error), option) from error
 
 
-def write_new(path: Path, data: str | bytes, option: str) -> None:
-    """Write a file that is not there yet.
+def write_new(path: Path, data: str | bytes) -> None:
+    """Write the file that ``--output`` names and that is not there yet.
 
     Parameters
     ----------
     data : str or bytes
         Text is written as UTF-8.
-    option : str
-        Option that named the file, for the message.
 
     Raises
     ------
     UsageError
         ``cannot_write``: it is there, or cannot be written.
     """
-    with writing(path, option), path.open("xb") as stream:
+    with writing(path, "--output"), path.open("xb") as stream:
         stream.write(data.encode() if isinstance(data, str) else data)
 
 

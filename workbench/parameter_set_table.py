@@ -6,14 +6,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.workbench.numbers import number
 from kempf.workbench.ranked_warnings import show_warnings
-from kempf.workbench.terminal import number, print_table
+from kempf.workbench.terminal import print_table
 
 if TYPE_CHECKING:
     from kempf.warehouse.parameter_set import ParameterSet
 
 
-def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False, legs_too: bool = False) -> None:
+def print_parameter_set(
+    parameter_set: ParameterSet, title: str, *, verbose: bool = False, legs_too: bool = False
+) -> None:
     """Print a parameter set for a person: values with standard errors, noise levels, fit, the gravest warnings.
 
     Parameters
@@ -42,7 +45,7 @@ def tell_set(parameter_set: ParameterSet, title: str, *, verbose: bool = False, 
     show_warnings(parameter_set.warnings, verbose=verbose)
 
 
-def tell_by_likelihood(parameter_set: ParameterSet) -> None:
+def print_by_likelihood(parameter_set: ParameterSet) -> None:
     """Print, below parameters by the likelihood, that predictions take others, where they do."""
     if _of_legs(parameter_set):
         click.echo(

@@ -11,12 +11,9 @@ from dataclasses import dataclass
 from math import isnan, nan
 from typing import Any
 
-from kempf.pipeline.predict.median_error import median_error
-from kempf.workbench.report.numbers import in_degrees
-from kempf.workbench.terminal import number
+from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
+from kempf.workbench.numbers import in_degrees, number
 
-#: percent of the motion from which a free run has left the measured course
-_LOST = 100.0
 #: what is said beside free runs and sizes of `Rung.by_legs`
 BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, which predictions of manoeuvres take"
 
@@ -113,7 +110,7 @@ def by_manoeuvre(rung: Mapping[str, Any]) -> dict[str, float]:
 
     Of manoeuvres that came later there is none.
     """
-    return {name: _percent(error) for name, error in (rung.get("free_run_fitted_to_legs") or {}).items()}
+    return {name: _in_percent(error) for name, error in (rung.get("free_run_fitted_to_legs") or {}).items()}
 
 
 def sized(name: str, value: float, std: float | None, unit: str) -> str:
@@ -135,7 +132,7 @@ def in_words(error: float | None) -> str:
 
 def _off(rung: Mapping[str, Any]) -> tuple[int, int]:
     errors = list(by_manoeuvre(rung).values())
-    return sum(not error < _LOST for error in errors), len(errors)
+    return sum(not error < 100.0 * LEFT_THE_COURSE for error in errors), len(errors)
 
 
 def _leg(rung: Mapping[str, Any]) -> Errors:
@@ -150,7 +147,7 @@ def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
         fitted, held = (median_error(errors) if errors else None for errors in own)
     else:
         fitted, held = (
-            _percent(rung[error]) if rung[key] else None
+            _in_percent(rung[error]) if rung[key] else None
             for error, key in (("in_sample_error", "in_sample"), ("held_out_error", "held_out"))
         )
     return Errors(fitted, None, held)
@@ -161,7 +158,7 @@ def _mean(errors: Iterable[float | None]) -> float | None:
     return sum(every) / len(every) if every else None
 
 
-def _percent(error: float | None) -> float:
+def _in_percent(error: float | None) -> float:
     return nan if error is None else 100.0 * error
 
 

@@ -7,7 +7,6 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
-from math import isnan
 from textwrap import wrap
 from typing import Any
 
@@ -125,23 +124,6 @@ def _is_number(text: str) -> bool:
 def counted(number_of: int, noun: str) -> str:
     """Return a number with its noun, such as ``1 zigzag`` or ``2 zigzags``."""
     return f"{number_of} {noun}{'' if number_of == 1 else 's'}"
-
-
-#: a larger number is written with its power of ten
-_WHOLE = 1e6
-
-
-def number(value: float | None, digits: int = 4) -> str:
-    """Write a number with so many significant digits, whole below a million; a dash for none.
-
-    Examples
-    --------
-    >>> number(-0.000130912), number(None), number(1362.4, 3), number(12.3e6, 3)
-    ('-0.0001309', '-', '1362', '1.23e+07')
-    """
-    if value is None or isnan(value):
-        return "-"
-    return f"{value:.0f}" if 10.0**digits <= abs(value) < _WHOLE else f"{value:.{digits}g}"
 
 
 def _logged(done: int, total: int, what: str) -> None:

@@ -23,7 +23,7 @@ def diagnosed(ship: Ship, spec: ModelSpec) -> Mapping[str, Any]:
     with TemporaryDirectory() as place:
         warehouse = Warehouse(str(Path(place)))
         measured_ships.take_in(warehouse, ship)
-        return diagnose_vessel(warehouse, ship.name, spec)[0].show()
+        return diagnose_vessel(warehouse, ship.name, spec)[0].as_json()
 
 
 def section(stated: Mapping[str, Any]) -> list[str]:

@@ -17,7 +17,6 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_model, read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -72,7 +71,7 @@ def main() -> None:
     rows = []
     for effect, kind, days in _SIMULATED:
         with TemporaryDirectory() as place:
-            row = timed(simulated(Path(place), effect, kind, days), "speed", PLAIN)
+            row = timed(simulated(Path(place), effect, kind, days), "speed", ModelSpec())
         rows.append([f"simulated, {effect}", *row])
     with TemporaryDirectory() as place:
         warehouse, ship = Warehouse(place), measured_ships.tank(given.data)

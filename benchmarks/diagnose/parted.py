@@ -36,10 +36,11 @@ from kempf.flows.jobs.add_effect import add_effect
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.next_trial import next_trial
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import TrialSettings
 from kempf.schemas.errors import KempfError
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 
 _SEED, _CASES, _SHIPS = 20261129, 336, 12
@@ -95,7 +96,7 @@ def _parted(case: Case, c: float, warehouse: Warehouse, folder: Path) -> Parted 
     before = _first_set(warehouse, case)
     if len(before) < 2:
         return None
-    add_effect(warehouse, case.case_id, before[0], begin=(PLAIN, NONE_OF_ONES_OWN))
+    add_effect(warehouse, case.case_id, before[0], begin=(ModelSpec(), NONE_OF_ONES_OWN))
     ordered = next_trial(warehouse, case.case_id)
     if not ordered.parting:
         return None
@@ -115,7 +116,7 @@ def _parted(case: Case, c: float, warehouse: Warehouse, folder: Path) -> Parted 
 
 def _first_set(warehouse: Warehouse, case: Case) -> tuple[str, ...]:
     """Return the set with the true effect, or the first."""
-    content = diagnose_vessel(warehouse, case.case_id, PLAIN)[0].content
+    content = diagnose_vessel(warehouse, case.case_id, ModelSpec())[0].content
     sets = [tuple(one["effects"]) for one in content["sets"]]
     return next((one for one in sets if case.effect in one), sets[0] if sets else ())
 

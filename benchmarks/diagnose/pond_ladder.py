@@ -20,7 +20,7 @@ def main() -> None:
     with TemporaryDirectory() as folder:
         warehouse = Warehouse(folder)
         measured_ships.take_in(warehouse, ship)
-        found = diagnose_vessel(warehouse, ship.name, default_model_of(warehouse, ship.name))[0].show()
+        found = diagnose_vessel(warehouse, ship.name, default_model_of(warehouse, ship.name))[0].as_json()
     lines = [
         f"{len(found['fitted'])} manoeuvres fitted, {len(found['held_out'])} held out before anything was looked at: "
         "zigzags and random manoeuvres. The model is the one that her profile's surroundings choose.",

@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import diagnosed, section
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.standing_model import PLAIN
+from kempf.schemas.model_spec import ModelSpec
 
 
 def main() -> None:
@@ -24,7 +24,7 @@ def conclude(name: str, title: str, ships: Sequence[Ship]) -> None:
     """Diagnose ships from the plain model and write the page of what is concluded."""
     stated = []
     for ship in ships:
-        stated.append(diagnosed(ship, PLAIN))
+        stated.append(diagnosed(ship, ModelSpec()))
         print(ship.name, stated[-1]["verdict"], _sets(stated[-1]["sets"]), flush=True)
     rows = [
         [

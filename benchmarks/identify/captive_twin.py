@@ -118,7 +118,7 @@ def _of(number: int, model: ModelSpec) -> list[str]:
         warehouse = Warehouse(place)
         paths = sail(peer, Path(logs), np.random.default_rng([number, 1]))
         ingest(warehouse, paths, _VESSEL, read_profiles([_DOCS / "profiles" / "hsva_kvlcc2.yaml"]))
-        shown = diagnose_vessel(warehouse, _VESSEL, model)[0].show()
+        shown = diagnose_vessel(warehouse, _VESSEL, model)[0].as_json()
         added = tuple(step["added"] for step in shown["ladder"] if step["added"])
         alone = [(name,) for name in ("cross_flow_drag", "cross_flow_cubic") if (name,) != added]
         rows = []

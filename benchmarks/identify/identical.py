@@ -28,8 +28,9 @@ from kempf.flows.jobs.demonstrate import demonstrate
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.standing_model import PLAIN, Own
+from kempf.flows.jobs.standing_model import Own
 from kempf.flows.jobs.vessel_model import store_model
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import segments
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -61,14 +62,14 @@ def collect(source: str, data: Path) -> Content:
         for vessel in vessels:
             for segment in segments.current(warehouse, vessel):
                 key = f"{vessel}/{segment.log_id[:12]}/{segment.start_utc_ns}"
-                found[f"segment {key}"] = _segment(segment.show(""))
+                found[f"segment {key}"] = _segment(segment.as_json(""))
             for request in requests:
                 outcomes = identify_vessel(warehouse, vessel, request)
                 pooled = pool_vessel(warehouse, vessel, request, outcomes)
                 sets = [o.parameter_set for o in outcomes if o.parameter_set] + ([pooled[0]] if pooled else [])
                 found |= dict(_sets(vessel, sets))
             if source == "demo":
-                spec = PLAIN.model_copy(update={"effects": ("rudder_lag",)})
+                spec = ModelSpec().model_copy(update={"effects": ("rudder_lag",)})
                 found |= dict(_sets(vessel, [store_model(warehouse, choose(warehouse, vessel), spec, Own())[0]]))
     return found
 

@@ -21,7 +21,6 @@ from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import Signal
@@ -29,6 +28,7 @@ from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate import agreement
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import get
+from kempf.schemas.model_spec import ModelSpec
 
 #: effect, hull and a seed for each ship: two of every kind, their noise twice what is usual
 _SHIPS = tuple(
@@ -57,7 +57,7 @@ def fits(case: Case) -> tuple[float, tuple[PooledFit, PooledFit]]:
             with ExitStack() as patches:
                 for place in _NOISE_OUT if noisy else ():
                     patches.enter_context(patch(place, as_read))
-                found = assembled(warehouse, choose(warehouse, case.case_id), PLAIN)
+                found = assembled(warehouse, choose(warehouse, case.case_id), ModelSpec())
             with ThreadPoolExecutor(2) as workers:
                 made.append(staged(found.runs, found.spec, [get(case.effect)], workers)[1][-1])
         return float(next(iter(answer["parameters"].values()))), (made[0], made[1])

@@ -53,7 +53,7 @@ def sources(warehouse: Warehouse, vessel: str, spec: ModelSpec | None, named: Mo
     """Return the set that a diagnosis ends with, and that of a model whose effects are named by hand."""
     found = []
     plain = spec or default_model_of(warehouse, vessel)
-    ladder = diagnose_vessel(warehouse, vessel, plain)[0].show()["ladder"]
+    ladder = diagnose_vessel(warehouse, vessel, plain)[0].as_json()["ladder"]
     effects = (*plain.effects, *(step["added"] for step in ladder if step["added"]))
     ends = [("the diagnosis", plain.model_copy(update={"effects": effects}))]
     if named is not None:
@@ -74,7 +74,7 @@ def circles(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
             rate = figures.get("steady_yaw_rate_deg_s")
             if rate is not None and rate.predicted.value is not None:
                 ratios.append(rate.predicted.value / rate.measured)
-                inside.append(bool(rate.show()["inside"]))
+                inside.append(bool(rate.as_json()["inside"]))
             rows.append([f"{rudder:g} deg, {one.side}", *[_cell(figures.get(name)) for name in _CIRCLE]])
     lines = [f"### Turning circles by {source.words}", ""]
     if ratios:
@@ -134,7 +134,7 @@ def _shares(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
             off = [float(f.predicted.value or np.nan) - f.measured for f in own]
             lines.append(
                 f"- {words} overshoots of {len(own)} zigzags {sample.replace('_', ' ')}: off by {min(off):+.2f} to "
-                f"{max(off):+.2f} deg, {sum(bool(f.show()['inside']) for f in own)} in their 95 % interval"
+                f"{max(off):+.2f} deg, {sum(bool(f.as_json()['inside']) for f in own)} in their 95 % interval"
             )
     return lines
 
@@ -176,7 +176,7 @@ def _cell(figure: Beside | None) -> str:
     one = figure.predicted
     if one.value is None or one.low is None or one.high is None:
         return f"{figure.measured:.3g}: not predicted"
-    mark = "" if figure.show()["inside"] else ", outside"
+    mark = "" if figure.as_json()["inside"] else ", outside"
     return f"{figure.measured:.3g}: {one.value:.3g} ({one.low:.3g} to {one.high:.3g}{mark})"
 
 

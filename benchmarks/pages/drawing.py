@@ -23,7 +23,7 @@ from playwright.sync_api import Page
 from benchmarks import result_page
 from benchmarks.pages.browser import FIRST_PAINT_AND_SERIES, KEMPF, Opened, opened
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.workbench.web.data.bins import reduced
+from kempf.workbench.charts.bins import reduced
 
 _ROWS, _RATE_HZ, _REPEATS = 36_000, 10, 15
 _CHANNELS = ("rudder_angle", "heading", "yaw_rate", "speed_through_water", "speed_over_ground")

@@ -29,7 +29,6 @@ from kempf.flows.fleet import arrivals, plan
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.hooks import HOOKS
-from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs import ingest_logs
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
@@ -38,6 +37,7 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
 from kempf.flows.jobs.take_inbox import InboxRun, NeedsAPerson, take_inbox
 from kempf.flows.jobs.vessel_report import VesselReport
+from kempf.flows.jobs.vessel_state import responsible_code
 from kempf.flows.process.configuration import setting
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
@@ -57,7 +57,7 @@ def ingest_batch(warehouse: str, paths: list[str], vessel: str | None, profiles:
     files = [Path(p) for p in profiles] or list(beside)
     profile = read_profiles(files) if files else None
     outcomes = ingest_logs.ingest(Warehouse(warehouse), logs, vessel, profile)
-    return [outcome.show() for outcome in outcomes]
+    return [outcome.as_json() for outcome in outcomes]
 
 
 @task(name="take-inbox", retries=1, retry_delay_seconds=5)
@@ -99,7 +99,7 @@ def ingest(
     """
     if vessel is None and not profiles:
         runs = [inbox_task(warehouse, folder) for folder in paths]
-        outcomes = [outcome.show() for run in runs for outcome in run.ingested]
+        outcomes = [outcome.as_json() for run in runs for outcome in run.ingested]
         _show_logs(outcomes + [arrivals.in_quarantine(file) for run in runs for file in run.quarantined])
         waiting = [run for run in runs if run.quarantined]
         if waiting:
@@ -265,11 +265,11 @@ def reprocess(
     run = _Run(warehouse, changed_only, str(run_id) if run_id else None)
     todo = plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
     get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
-    shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
+    shown = create_progress_artifact(_percent_done(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
     assert isinstance(shown, UUID)  # it is a coroutine only where a loop runs
 
     def progress(done: int) -> None:
-        update_progress_artifact(shown, _percent(len(todo.kept) + done, todo.vessels))
+        update_progress_artifact(shown, _percent_done(len(todo.kept) + done, todo.vessels))
 
     reports = {report["vessel"]: report for report in todo.kept}
     if todo.due:
@@ -304,7 +304,7 @@ def reports_of(
 _PROGRESS = "Vessels that are up to date, percent"
 
 
-def _percent(done: int, total: int) -> float:
+def _percent_done(done: int, total: int) -> float:
     return 100.0 * done / total if total else 100.0
 
 
@@ -315,9 +315,9 @@ def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any])
     for vessel in vessels:
         try:
             diagnosis, _ = diagnose_vessel(Warehouse(warehouse), vessel, _model(warehouse, vessel, spec))
-            documents.append(diagnosis.show())
+            documents.append(diagnosis.as_json())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
+            documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).as_json()["error"]})
         get_run_logger().info("%s: %s", vessel, documents[-1]["verdict"])
     return documents
 

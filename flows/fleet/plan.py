@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.flows.fleet.state import VesselState, fleet_state, responsible_code
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessels
 from kempf.flows.jobs.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
+from kempf.flows.jobs.vessel_state import VesselState, fleet_state, responsible_code
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -98,7 +98,7 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
     reports = [from_run(run) for run in settled.values()]
     again = [report.as_run(states[report.vessel].digest, changed_only=True, estimator=None) for report in reports]
     runs.record_all(warehouse, again)
-    return Plan(tuple((name, logs) for logs, name in reversed(due)), tuple(report.show() for report in reports))
+    return Plan(tuple((name, logs) for logs, name in reversed(due)), tuple(report.as_json() for report in reports))
 
 
 def _settled(warehouse: Warehouse, states: Mapping[str, VesselState]) -> dict[str, FlowRun]:
@@ -146,7 +146,7 @@ def do_batch(
             report.fail(report.vessel, wrapped(error))
     for report in reports:
         progress(report)
-    return [report.show() for report in reports]
+    return [report.as_json() for report in reports]
 
 
 def _refuse_other_code(code: Sequence[str] | None) -> None:
@@ -178,7 +178,7 @@ def lost(batch: Sequence[str], error: BaseException) -> list[Report]:
             "Run it again; look at the worker's log, and at its memory.",
         )
         report.fail(vessel, failure)
-        reports.append(report.show())
+        reports.append(report.as_json())
     return reports
 
 

@@ -24,13 +24,13 @@ from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.began import Began, began
 from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.filtered_beginning import start_of, steady_wind, usual_force
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.pipeline.model.chain import F, R, V
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
@@ -38,11 +38,6 @@ from kempf.warehouse import notes
 from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
-
-#: parts of a manoeuvre, none longer than a leg: what changes within one averages out
-_PARTS = 16
-#: a force that changes faster is no wind that is steady over a manoeuvre
-_STEADY_PER_S = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +129,7 @@ def _one(
         manoeuvre=_as_ordered(manoeuvre, segment),
         speed_m_s=speed_m_s,
         began=beginning.counted_from(radians(segment.base_heading_deg)),
-        wind_force_m_s2=_steady_wind(run, passed) if run and passed else without_run,
+        wind_force_m_s2=steady_wind(run, passed) if run and passed else without_run,
         arm_per_m=(run.run if run else predicted.basis.runs.runs[0]).ship.arm_per_m,
         sample="fitted" if fitted else "held_out",
         load=run.run.load if run else None,
@@ -151,10 +146,7 @@ def _usual_wind(predicted: Predicted) -> tuple[float, float]:
     model = _with_its_noise(predicted)
     filters = [RunFilter(run, model, basis.runs.spec) for run in basis.runs.runs]
     passes = [(one, _passed(one, predicted)) for one in filters]
-    found = [_steady_wind(one, passed) for one, passed in passes if passed]
-    # one that could not be passed says nothing
-    steady = [force for force, std in found if std > 0.0]
-    return 0.0, float(np.sqrt(np.mean(np.square(steady)))) if steady else 0.0
+    return 0.0, usual_force([steady_wind(one, passed) for one, passed in passes if passed])
 
 
 class _Logs:
@@ -255,28 +247,5 @@ def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> tuple[Sta
     """Return with which speed, drift, turn and rudder a zigzag began, and standard errors as the filter has them."""
     executes = list(segment.detail.get("executes", ()))
     at = (executes[0]["time_utc_ns"] - run.run.start_utc_ns) / SECOND_NS if executes else 0.0
-    speed = float(np.interp(at, run.run.time_s, run.run.speed_m_s))
-    if passed is None or not np.all(np.isfinite(passed.states)):
-        return Start(forward_m_s=speed), Start()
-    lateral, rate = (float(np.interp(at, run.run.time_s, passed.states[:, i])) for i in (V, R))
-    errors = (float(np.sqrt(np.interp(at, run.run.time_s, passed.spread[:, i]))) for i in (V, R))
     rudder = radians(float(executes[0]["rudder_before_deg"])) if executes else None
-    return Start(speed, lateral, rate, rudder), Start(None, *errors)
-
-
-def _steady_wind(run: RunFilter, passed: Passed) -> tuple[float, float]:
-    """Return the wind force that the filter comes to in a manoeuvre, m/s^2, and how far that of a leg is from it.
-
-    Both are 0 where the model's force is no steady wind.
-    """
-    if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S:
-        return 0.0, 0.0
-    # the first half is what it takes to find it; in its first legs it was as far from there as in any other
-    late = slice(len(passed.states) // 2, None)
-    force, spread = float(np.mean(passed.states[late, F])), float(np.mean(passed.spread[late, F]))
-    legs = np.array_split(passed.states[:, F] - force, _PARTS)[1:]
-    wander = float(np.mean([np.mean(leg) ** 2 for leg in legs]))
-    within = float(np.mean([np.mean(leg**2) for leg in legs]))
-    # an error of the filter changes as quickly as the force that it follows
-    std = float(np.sqrt(wander + spread * (wander / within if within > 0.0 else 1.0)))
-    return (force, std) if np.isfinite(force + std) else (0.0, 0.0)
+    return start_of(run, passed, at, rudder)

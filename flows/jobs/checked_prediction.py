@@ -24,13 +24,13 @@ _FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 
 
 def predict_checked(
-    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
+    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent
 ) -> Predicted:
     """Predict a manoeuvre, and the first two overshoots of every zigzag of the vessel to see what the errors miss.
 
-    Parameters and errors are those of `kempf.flows.jobs.predict_vessel.predict_vessel`.
+    Parameters and errors are those of `kempf.flows.jobs.predict_vessel.models_of_set`.
     """
-    return CheckedPredictions(warehouse, vessel, request, progress).predict(request, progress, count)
+    return CheckedPredictions(warehouse, vessel, request, progress).predict(request, progress)
 
 
 class CheckedPredictions:
@@ -39,7 +39,7 @@ class CheckedPredictions:
     Parameters
     ----------
     warehouse, vessel, progress
-        As `kempf.flows.jobs.predict_vessel.predict_vessel` takes them.
+        As `kempf.flows.jobs.predict_vessel.models_of_set` takes them.
     request : PredictRequest
         Says which set and which speed.
     """

@@ -13,6 +13,7 @@ from kempf.schemas.errors import NotFound
 from kempf.warehouse import logs, notes, segments
 from kempf.warehouse.deduplicate import once
 from kempf.warehouse.equivalents import code_of
+from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
@@ -65,15 +66,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
     manoeuvres = [s for s in every if s.ingest_id not in failed]
     left = {s.segment_id: failed[s.ingest_id] for s in every if s.ingest_id in failed}
     if not manoeuvres:
-        raise NotFound(
-            "no_segments",
-            f"Neither a zigzag nor a random manoeuvre was found in the {len(rows)} logs of {vessel!r}."
-            if not left
-            else f"None of the {len(left)} manoeuvres of {vessel!r} counts: {'; '.join(sorted(set(left.values())))}.",
-            "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to "
-            "which no model is fitted.",
-            {"vessel": vessel, **({"skipped": left} if left else {})},
-        )
+        raise no_segments(vessel, list(rows.values()), left)
     profile_sha256 = rows[max(manoeuvres, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
     # a broken-off zigzag stays: its rudder moved too
     kept, twins = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256])
@@ -122,3 +115,28 @@ def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = sil
 def out_of_date(refreshed: Refreshed) -> dict[str, str]:
     """Return for each ingest that could not be brought up to date why its manoeuvres do not count."""
     return {ingest: f"its log cannot be read anew: {error.message}" for ingest, error in refreshed.failed.items()}
+
+
+def no_segments(vessel: str, rows: Sequence[LogRow], left_out: Mapping[str, str] = MappingProxyType({})) -> NotFound:
+    """Return the error that a vessel has no manoeuvre that a model is fitted to.
+
+    Parameters
+    ----------
+    rows : sequence of LogRow
+        Her logs.
+    left_out : mapping of str to str, optional
+        Why a manoeuvre does not count, by its id.
+    """
+    return NotFound(
+        "no_segments",
+        f"Neither a zigzag nor a random manoeuvre was found in the {len(rows)} logs of {vessel!r}, so there is nothing "
+        "to identify from."
+        if not left_out
+        else f"None of the {len(left_out)} manoeuvres of {vessel!r} counts: "
+        f"{'; '.join(sorted(set(left_out.values())))}.",
+        "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to which "
+        "no model is fitted.",
+        {"vessel": vessel, "logs": [row.file_name for row in rows]}
+        if not left_out
+        else {"vessel": vessel, "skipped": dict(left_out)},
+    )

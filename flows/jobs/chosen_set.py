@@ -43,15 +43,7 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
             f"Make one with `kempf identify --vessel {vessel!r}`, or choose one with `kempf params alias current ID`.",
             {"vessel": vessel},
         )
-    parameter_set = parameter_sets.get(warehouse, name)
-    if parameter_set.vessel != vessel:
-        raise UsageError(
-            "set_of_another_vessel",
-            f"{parameter_set.parameter_set_id} is a parameter set of {parameter_set.vessel!r}, not of {vessel!r}.",
-            f"List hers with `kempf params list --vessel {vessel!r}`.",
-            {"parameter_set_id": parameter_set.parameter_set_id, "vessel": parameter_set.vessel},
-        )
-    return parameter_set, None
+    return parameter_sets.get_of(warehouse, name, vessel), None
 
 
 def named_set(warehouse: Warehouse, name: str | None, vessel: str | None = None) -> ParameterSet:

@@ -59,7 +59,7 @@ class Beside:
         end = self.measured_low if above else self.measured_high
         return abs(self.measured - value) <= hypot(own, 0.0 if end is None else self.measured - end)
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         measured = {"measured": self.measured, "measured_low": self.measured_low, "measured_high": self.measured_high}
         return {"figure": self.name, **measured, **vars(self.predicted), "inside": self.inside, "agrees": self.agrees}
@@ -83,9 +83,9 @@ class MeasuredManoeuvre:
     #: Why there is no prediction; empty where there is one.
     why: str = ""
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        return {**vars(self), "figures": [figure.show() for figure in self.figures]}
+        return {**vars(self), "figures": [figure.as_json() for figure in self.figures]}
 
 
 def measured_beside(

@@ -44,7 +44,7 @@ class Comparison:
     #: Why a segment is not among them, by its id.
     skipped: dict[str, str]
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the comparison as the command line's JSON object."""
         sample, error = judged(self.runs)
         return {
@@ -56,8 +56,8 @@ class Comparison:
             "horizon": self.horizon.name,
             "horizon_words": self.horizon.words,
             "runs": [
-                {**run.show(), **{name: sailed[name] for name in _SAILED}}
-                for run, sailed in zip(self.runs, (segment.show("") for segment in self.found), strict=True)
+                {**run.as_json(), **{name: sailed[name] for name in _SAILED}}
+                for run, sailed in zip(self.runs, (segment.as_json("") for segment in self.found), strict=True)
             ],
             "summary": summary(self.runs),
             "judged": {"sample": sample, "free_run_error_percent": error},

@@ -12,11 +12,12 @@ from itertools import pairwise
 from typing import Any
 
 from kempf.flows.jobs import search_log
-from kempf.flows.jobs.following import Following, of_segments
+from kempf.flows.jobs.affected_sets import Affected, of_segments
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, examinations, logs, segments
 from kempf.warehouse.instant import iso_utc
@@ -36,7 +37,7 @@ class Planned:
     before: Segment | None
     after: Segment
     #: What follows for the vessel.
-    following: Following
+    affected: Affected
     _searched: SearchedLog
     _said: tuple[Correction, ...]
 
@@ -48,7 +49,7 @@ class Planned:
         if _with(before, self.correction) != before:
             corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
         # before the manoeuvres: once they are otherwise it is not seen any more what rested on them
-        if self.following.current:
+        if self.affected.current:
             aliases.withdraw(warehouse, self.log.vessel)
         # another person may have corrected the same log meanwhile
         now = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
@@ -69,14 +70,14 @@ class Planned:
             "bounds may cut a leg or enclose two manoeuvres",
         )
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "action": self.correction.action,
             "reason": self.correction.reason,
-            "before": self.before.show(self.log.file_name) if self.before else None,
-            "after": self.after.show(self.log.file_name),
-            "following": self.following.show(),
+            "before": self.before.as_json(self.log.file_name) if self.before else None,
+            "after": self.after.as_json(self.log.file_name),
+            "following": self.affected.as_json(),
             "doubts": list(self.doubts),
         }
 
@@ -113,7 +114,7 @@ def plan_for(
     if action == "correct" and not segment.is_zigzag:
         raise UsageError(
             "not_a_zigzag",
-            f"{segment.segment_id} is a {segment.kind.replace('_', ' ')}; bounds are given to zigzags only.",
+            f"{segment.segment_id} is a {as_words(segment.kind)}; bounds are given to zigzags only.",
             "Exclude it with `kempf segments exclude`, or add a zigzag with `kempf segments add`.",
             {"segment_id": segment.segment_id, "kind": segment.kind},
         )
@@ -158,7 +159,7 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     if held is not None and (_subject(held) != bounds_utc_ns or _is_looked_through(warehouse, log, held)):
         raise UsageError(
             "bounds_overlap",
-            f"There is a {held.kind.replace('_', ' ')} already: {held.segment_id}, {_span(held)}"
+            f"There is a {as_words(held.kind)} already: {held.segment_id}, {_span(held)}"
             f"{', which was excluded' if held.excluded else ''}.",
             "Give it other bounds with `kempf segments correct`, or let it count with `kempf segments accept`.",
             {"segment_id": held.segment_id},

@@ -14,7 +14,7 @@ from kempf.pipeline.channels.doctor.corrections import entries
 from kempf.pipeline.channels.doctor.examine import Examination, examine
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.refused import by_channel, count
-from kempf.pipeline.channels.doctor.verdict import as_content
+from kempf.pipeline.channels.doctor.verdict import as_json
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.channels.there_and_back import counted
 from kempf.schemas.profile import VesselProfile
@@ -58,7 +58,7 @@ def examine_instruments(
     log = Log.of(instruments, profile.length_m, profile.trial_speed_m_s, units, beyond)
     examination = examine(log)
     left_out = [counted(name, at.size) for name, at in instruments.left_out.items()]
-    content = {**as_content(examination, known, log_format), "left_out": left_out}
+    content = {**as_json(examination, known, log_format), "left_out": left_out}
     return ExaminedLog(file_name, log_format, log, examination, content)
 
 

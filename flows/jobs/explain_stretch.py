@@ -33,7 +33,7 @@ class ExplainedStretch:
     end_utc_ns: int
     found: Explained
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
         return {
             "vessel": self.vessel,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from kempf.flows.jobs.chosen_manoeuvres import without_log
+from kempf.flows.jobs.chosen_manoeuvres import no_segments, without_log
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, as_parameter_set, without_arm
@@ -23,7 +23,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.estimators import default_settings, estimate
 from kempf.pipeline.estimate.plausibility import may_last
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
@@ -35,7 +35,7 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class Request:
-    """What a person asks for: which model, which estimator, which of its settings differ from the defaults.
+    """What a person asks for: which model, which estimator.
 
     ``own`` are effects of the model that are not in the catalogue. ``no_log`` are the settings of
     `pipeline.estimate.no_log.identify.NoLogSettings`, for segments without a speed through the water.
@@ -43,7 +43,6 @@ class Request:
 
     spec: ModelSpec = field(default_factory=ModelSpec)
     estimator: str = "ml"
-    settings: tuple[tuple[str, Any], ...] = ()
     no_log: tuple[tuple[str, Any], ...] = ()
     own: Own = NONE_OF_ONES_OWN
 
@@ -60,7 +59,7 @@ class Request:
         """Every setting of the estimator, defaults included; they are part of a set's identity."""
         if self.spec.effects:
             return effect_settings(self.spec, self.own)
-        return {**default_settings(self.estimator), **dict(self.settings)}
+        return default_settings(self.estimator)
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ def identify_segments(
     # of the logs just listed only: another process may read one anew at any moment
     current = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
     if not current:
-        raise _no_segments(warehouse, vessel)
+        raise no_segments(vessel, logs.current(warehouse, vessel))
     table_versions = delta.versions(warehouse)
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
     tasks = _wanted(warehouse, request, readable, by_ingest)
@@ -239,18 +238,6 @@ def _identify_log(
         return _made(task.segment, parameter_set)
 
     return list(pool.map(one, tasks))
-
-
-def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
-    held = logs.current(warehouse, vessel)
-    return NotFound(
-        "no_segments",
-        f"Neither a zigzag nor a random manoeuvre was found in the {len(held)} logs of {vessel!r}, so there is nothing "
-        "to identify from.",
-        "Ingest a log that holds one: `kempf segments` lists what her logs hold, also circles and pull-outs, to which "
-        "no model is fitted.",
-        {"vessel": vessel, "logs": [row.file_name for row in held]},
-    )
 
 
 def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:

@@ -63,7 +63,7 @@ class IngestOutcome:
     #: Why it failed; then nothing of the log was stored.
     error: KempfError | None = None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the outcome as JSON content."""
         return {
             "path": self.path,
@@ -79,7 +79,7 @@ class IngestOutcome:
             "segments": [segment.segment_id for segment in self.segments],
             "other_manoeuvres": [{"segment_id": s.segment_id, "kind": s.kind} for s in self.others],
             "channels": _channels(self.examination),
-            **(self.error.to_json() if self.error else {}),
+            **(self.error.as_json() if self.error else {}),
         }
 
 

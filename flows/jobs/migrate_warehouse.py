@@ -23,7 +23,7 @@ class Migration:
     #: What was compared in the end, a sentence each; empty before.
     compared: list[str]
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {"from": self.since, "to": self.until, "done": self.to_do, "compared": self.compared}
 

@@ -104,7 +104,7 @@ class NextTrial:
         """Whether models are to be parted, not an interval to be halved."""
         return len(self.models) > 1 and self.parameter is None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
         return {
             "vessel": self.vessel,
@@ -115,7 +115,7 @@ class NextTrial:
             "speed_m_s": self.speed_m_s,
             "trials": [_show(trial) for trial in self.trials],
             "order": self.order(),
-            "expected": self.predicted.show()["figures"],
+            "expected": self.predicted.as_json()["figures"],
             "sentences": self.sentences(),
         }
 
@@ -208,7 +208,7 @@ def next_trial(
     Raises
     ------
     UsageError
-        ``parameter_unknown``; what `kempf.flows.jobs.predict_vessel.predict_vessel` raises.
+        ``parameter_unknown``; what `kempf.flows.jobs.predict_vessel.models_of_set` raises.
     NotFound
         ``no_parameter_set``, ``no_runs``.
     DataRejected

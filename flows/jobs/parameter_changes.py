@@ -45,7 +45,7 @@ class Move:
             return abs(self.in_std)
         return 0.0 if self.before == self.after or (isnan(self.before) and isnan(self.after)) else inf
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 
@@ -59,7 +59,7 @@ class NewSet:
     estimator: str
     start: str
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 

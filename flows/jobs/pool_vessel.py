@@ -93,9 +93,7 @@ def pool_segments(
     if isinstance(chosen, str):
         return None
     parameter_set, is_new = store_up_to_date(
-        *(warehouse, chosen, request.spec, request.own, progress, flow_run),
-        search=dict(request.settings),
-        keep=new.keep,
+        *(warehouse, chosen, request.spec, request.own, progress, flow_run), keep=new.keep
     )
     if parameter_set.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
         new.point(parameter_set.parameter_set_id)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from math import isfinite, radians
 from typing import TYPE_CHECKING, Literal
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 
 Kind = Literal["turning-circle", "zigzag", "pull-out", "spiral"]
+Side = Literal["starboard", "port"]
 #: rudder of a manoeuvre where none is asked for, deg
 USUAL_RUDDER_DEG: dict[Kind, float] = {"turning-circle": 35.0, "pull-out": 20.0, "spiral": 20.0}
 
@@ -29,7 +31,7 @@ class PredictRequest:
     #: Heading and rudder of a zigzag.
     angles_deg: tuple[float, float] = (20.0, 20.0)
     #: Of the turn, or of the first execute.
-    side: Literal["starboard", "port"] = "starboard"
+    side: Side = "starboard"
     #: Of the approach; None takes the mean of those that were sailed.
     speed_m_s: float | None = None
     #: Of another steering gear; None takes the rudder's rate that the logs show.
@@ -61,6 +63,34 @@ def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
     if request.kind == "turning-circle":
         return TurningCircle(radians(angle), side)
     return PullOut(radians(angle), side) if request.kind == "pull-out" else Spiral(radians(angle))
+
+
+def angles_of(text: str, option: str = "") -> tuple[float, float]:
+    """Return heading and rudder of a zigzag, deg.
+
+    Parameters
+    ----------
+    option : str, optional
+        Option that gave them, for the message.
+
+    Raises
+    ------
+    UsageError
+        ``angles_unreadable``.
+
+    Examples
+    --------
+    >>> angles_of("20/10")
+    (20.0, 10.0)
+    """
+    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)\s*", text)
+    if match is None:
+        raise UsageError(
+            "angles_unreadable",
+            f"{option} {text[:60]!r} is no pair of angles.".lstrip(),
+            "Give heading and rudder, such as 20/20.",
+        )
+    return float(match[1]), float(match[2])
 
 
 def _rudder_deg(request: PredictRequest) -> float:

@@ -37,15 +37,20 @@ class ModelsOfSet:
     against: tuple[str, ...] = ()
 
 
-def predict_vessel(
-    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
-) -> Predicted:
-    """Predict a standard manoeuvre of a vessel in calm, deep water.
+def models_of_set(
+    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent
+) -> ModelsOfSet:
+    """Return the models of the set that is asked for, at the speed that is asked for.
 
     Parameters
     ----------
-    count : int, optional
-        Ships drawn from every model, a power of two.
+    warehouse : Warehouse
+    vessel : str
+        Whose models.
+    request : PredictRequest
+        Says which set and which speed; what it says of the manoeuvre is checked.
+    progress : Progress, optional
+        Told how far the search for rival models is.
 
     Raises
     ------
@@ -57,13 +62,6 @@ def predict_vessel(
     DataRejected
         ``set_without_covariance``, ``predicts_no_ship``.
     """
-    return predict_with(models_of_set(warehouse, vessel, request, progress), request, progress, count)
-
-
-def models_of_set(
-    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent
-) -> ModelsOfSet:
-    """Return the models of the set that is asked for, at the speed that is asked for; errors are `predict_vessel`'s."""
     required(request)
     parameter_set, _ = chosen_set(warehouse, vessel, request.set_id)
     basis = basis_of(warehouse, parameter_set, progress)
@@ -77,7 +75,23 @@ def models_of_set(
 def predict_with(
     set_models: ModelsOfSet, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
 ) -> Predicted:
-    """Predict a manoeuvre with models that are there; set and speed are theirs, errors are `predict_vessel`'s."""
+    """Predict a standard manoeuvre in calm, deep water with models that are there.
+
+    Parameters
+    ----------
+    set_models : ModelsOfSet
+        Set and speed are theirs.
+    request : PredictRequest
+        Says which manoeuvre.
+    progress : Progress, optional
+    count : int, optional
+        Ships drawn from every model, a power of two.
+
+    Raises
+    ------
+    UsageError, DataRejected
+        As `models_of_set`.
+    """
     required(request)
     models, basis = list(set_models.models), set_models.basis
     if request.rudder_rate is not None:

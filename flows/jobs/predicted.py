@@ -47,7 +47,7 @@ class Predicted:
     #: What diagnoses and the channels of the logs say against the set, sentences.
     against: tuple[str, ...] = ()
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
         prediction, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
         return {

@@ -65,7 +65,7 @@ class VesselPreview:
     #: What the present code cannot do that is to be done, each with the error's JSON.
     failures: tuple[dict[str, Any], ...] = field(default=())
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content, without the moves, which stand together for all vessels."""
         return {
             "vessel": self.vessel,
@@ -73,7 +73,7 @@ class VesselPreview:
             "up_to_date": self.up_to_date,
             "identical": self.identical,
             "moved": len({move.parameter_set_id for move in self.moves}),
-            "new": [new_set.show() for new_set in self.new],
+            "new": [new_set.as_json() for new_set in self.new],
             "gone": list(self.gone),
             "logs": self.logs,
             "logs_otherwise": list(self.logs_otherwise),
@@ -236,4 +236,4 @@ def _without_code(row: StoredExamination | Segment) -> dict[str, Any]:
 
 
 def _failure(what: str, error: KempfError) -> dict[str, Any]:
-    return {"what": what, **error.to_json()}
+    return {"what": what, **error.as_json()}

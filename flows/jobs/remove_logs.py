@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from kempf.flows.jobs.following import Following, of_logs
+from kempf.flows.jobs.affected_sets import Affected, of_logs
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
@@ -21,7 +21,7 @@ from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
 
-def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Following:
+def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Affected:
     """Let logs of one vessel count no longer.
 
     Parameters
@@ -37,12 +37,12 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
         ``no_reason``.
     """
     require_reason(reason)
-    following = of_logs(warehouse, rows)
+    affected = of_logs(warehouse, rows)
     # first: once the logs count no longer the same command has nothing to go on with
-    if following.current:
-        aliases.withdraw(warehouse, following.vessel)
+    if affected.current:
+        aliases.withdraw(warehouse, affected.vessel)
     _mark(warehouse, rows, reason)
-    return following
+    return affected
 
 
 def _mark(warehouse: Warehouse, rows: Sequence[LogRow], reason: str | None) -> None:
@@ -79,7 +79,7 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
 
 def move(
     warehouse: Warehouse, name: str, vessel: str, reason: str, *, new_vessel: bool = False
-) -> tuple[Following | None, LogRow]:
+) -> tuple[Affected | None, LogRow]:
     """Give a log to another vessel: it is removed from the one and read from its bytes for the other.
 
     Where the move is interrupted the log is the old vessel's, or nobody's; the same command goes on.
@@ -97,7 +97,7 @@ def move(
 
     Returns
     -------
-    following : Following or None
+    affected : Affected or None
         What follows for the vessel it was taken from; None where it was removed before.
     row : LogRow
         The log as it is now.
@@ -128,9 +128,9 @@ def move(
         notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
         for segment_id in _noted_segments(warehouse, row):
             notes.carry(warehouse, "segment", segment_id, row.vessel, whose)
-        following = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
+        affected = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
-    return following, logs.by_prefix(warehouse, row.log_id)
+    return affected, logs.by_prefix(warehouse, row.log_id)
 
 
 def _noted_segments(warehouse: Warehouse, row: LogRow) -> list[str]:
@@ -166,12 +166,12 @@ def held_or_removed(warehouse: Warehouse, name: str) -> LogRow:
             raise error from None
 
 
-def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Following | None:
+def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Affected | None:
     """Let a vessel and all her logs count no longer.
 
     Returns
     -------
-    Following or None
+    Affected or None
         What follows for her logs; None where she has none.
 
     Raises
@@ -184,9 +184,9 @@ def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Following |
     require_reason(reason)
     vessels.require(warehouse, vessel)
     held = logs.current(warehouse, vessel)
-    following = remove(warehouse, held, reason) if held else None
+    affected = remove(warehouse, held, reason) if held else None
     vessels.remove(warehouse, vessel, reason)
-    return following
+    return affected
 
 
 def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> list[LogRow]:

@@ -28,7 +28,7 @@ from kempf.warehouse.equivalents import code_of, codes_of
 from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
-from kempf.warehouse.migrations.chain import mend_marker
+from kempf.warehouse.migrations.chain import repair_marker
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, verify
 
@@ -52,9 +52,9 @@ class Repaired:
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
     registers: bool = False
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
-        return {"done": self.done, "lost": self.gone, "left": [problem.show() for problem in self.left]}
+        return {"done": self.done, "lost": self.gone, "left": [problem.as_json() for problem in self.left]}
 
 
 def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
@@ -66,7 +66,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
         ``no_warehouse``.
     """
     outcome = Repaired()
-    if mend_marker(warehouse):
+    if repair_marker(warehouse):
         outcome.done.append("The file that marks the warehouse was written anew.")
     warehouse.require()
     _recall(warehouse, outcome)
@@ -75,7 +75,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
             progress(0, 1, f"table {name}")
             try:
                 _table(warehouse, warehouse.folder / name, name, outcome)
-            except KempfError as error:  # the other tables are mended all the same
+            except KempfError as error:  # the other tables are repaired all the same
                 outcome.gone.append(f"the table {name}: {error.message}")
     _profiles(warehouse, outcome)
     _removed_again(warehouse, outcome)
@@ -95,7 +95,7 @@ def _table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> 
     """Put the log of a table back, and take its damaged files out."""
     if not folder.is_dir():
         return
-    outcome.done += seals.mend_log(folder, name)
+    outcome.done += seals.repair_log(folder, name)
     if not (folder / "_delta_log").is_dir():
         return
     table = delta.open_table(warehouse, name)
@@ -103,7 +103,7 @@ def _table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> 
         return
     live = {Path(path) for path in table.file_uris()}
     every = live | {path for path in folder.rglob("*.parquet") if folder / "_delta_log" not in path.parents}
-    outcome.done += seals.mend_seals(folder, name, sorted(every))
+    outcome.done += seals.repair_seals(folder, name, sorted(every))
     bad = [path for path in sorted(every) if _is_bad(folder, name, path, live)]
     rows = _rows_by_file(table)
     for path in bad:
@@ -207,13 +207,13 @@ def _each(
     outcome: Repaired,
     progress: Progress,
     names: Sequence[str],
-    mend: Callable[[Warehouse, str], str],
+    repair_one: Callable[[Warehouse, str], str],
 ) -> None:
-    """Mend logs one by one; one that cannot be stops no other."""
+    """Repair logs one by one; one that cannot be stops no other."""
     for done, name in enumerate(names):
         progress(done, len(names), f"log {name[:12]}")
         try:
-            outcome.done.append(mend(warehouse, name))
+            outcome.done.append(repair_one(warehouse, name))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
             outcome.gone.append(f"the log {name}: {wrapped(error).message}")
 

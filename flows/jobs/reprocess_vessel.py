@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from kempf.flows.fleet.state import VesselState, fleet_state
 from kempf.flows.jobs.chosen_manoeuvres import choose, out_of_date
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
@@ -23,6 +22,7 @@ from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point
 from kempf.flows.jobs.update_model import store_up_to_date
 from kempf.flows.jobs.vessel_quality import quality_of
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all, remember_history
+from kempf.flows.jobs.vessel_state import VesselState, fleet_state
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -234,7 +234,7 @@ class _Reprocessing:
         if work.report.segments and self.request is None:
             self._model(work)
         _withdraw(self.warehouse, work.vessel, work.report)
-        work.report.findings = [finding.show() for finding in quality_of(self.warehouse, work.vessel)]
+        work.report.findings = [finding.as_json() for finding in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
         """Bring her current model with effects up to date, or that withdrawn; where that fails it stays as it was."""

@@ -77,7 +77,7 @@ class Experiment:
     #: Of the same record.
     maximum_likelihood: Estimate
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the JSON content."""
         accuracy = {
             p.name: {
@@ -120,13 +120,13 @@ class Reproduction:
     discrete: tuple[Value, ...]
     experiments: tuple[Experiment, ...]
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the JSON content."""
         return {
             "conditions": {name: {"value": v, "stated_by": by} for name, (v, by) in self.conditions.items()},
             "truth": self.truth,
             "discrete": {v.name: {"value": v.value, "unit": v.unit} for v in self.discrete},
-            "experiments": [experiment.show() for experiment in self.experiments],
+            "experiments": [experiment.as_json() for experiment in self.experiments],
         }
 
 

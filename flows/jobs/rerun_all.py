@@ -14,9 +14,9 @@ from itertools import groupby
 from os import cpu_count
 from typing import Any
 
-from kempf.flows.fleet.state import code_of_sets
 from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
 from kempf.flows.jobs.standing_model import POOLED
+from kempf.flows.jobs.vessel_state import code_of_sets
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
@@ -54,7 +54,7 @@ class RerunVerdict:
     #: Why it could not be built again.
     error: KempfError | None = None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "vessel": self.vessel,
@@ -64,7 +64,7 @@ class RerunVerdict:
             "packages_changed": self.packages_changed or {},
             "differing_fields": self.differences,
             "differences": list(self.fields),
-            **(self.error.to_json() if self.error else {}),
+            **(self.error.as_json() if self.error else {}),
         }
 
 
@@ -81,7 +81,7 @@ class Verification:
         of = Counter(v.verdict for v in self.verdicts if code_changed is None or v.code_changed == code_changed)
         return {verdict: of[verdict] for verdict in VERDICTS}
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content; sets that are bit-identical are counted and not listed."""
         return {
             "sets": len(self.verdicts),
@@ -90,7 +90,7 @@ class Verification:
             "of_this_code": self.counts(code_changed=False),
             "of_other_code": self.counts(code_changed=True),
             "of_purged_logs": list(self.of_purged_logs),
-            "not_identical": [v.show() for v in self.verdicts if v.verdict != VERDICTS[0]],
+            "not_identical": [v.as_json() for v in self.verdicts if v.verdict != VERDICTS[0]],
         }
 
 

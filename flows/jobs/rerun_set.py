@@ -41,7 +41,7 @@ class Rerun:
     #: Verdicts on the sets that it brings forward, by id, the one that was fitted at once first.
     rests_on: dict[str, str] = field(default_factory=dict)
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the verdict as JSON content."""
         return {
             "parameter_set_id": self.parameter_set_id,

@@ -10,7 +10,7 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.standing_model import SEARCH, inputs_of, model_of
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
-from kempf.schemas.enumeration import listed
+from kempf.schemas.enumeration import as_words, listed
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import code_version, diagnoses, parameter_sets
@@ -100,9 +100,7 @@ def _against(found: Sequence[StoredDiagnosis], effects: Sequence[str]) -> tuple[
     if not left:
         return ()
     one = max(left, key=lambda d: d.diagnosis_id)
-    return (
-        f"{one.diagnosis_id} says {one.verdict.replace('_', ' ')}: what no known effect explains is in no interval",
-    )
+    return (f"{one.diagnosis_id} says {as_words(one.verdict)}: what no known effect explains is in no interval",)
 
 
 def _inputs(parameter_set: ParameterSet) -> Mapping[str, Any]:

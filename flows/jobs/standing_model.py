@@ -25,8 +25,6 @@ from kempf.warehouse.store import Warehouse
 POOLED, WITH_EFFECTS, SINGLE = "ml-pooled", "ml-effects", "ml"
 #: key of a pooled set's settings that holds those of its search, where they are not the defaults
 SEARCH = "search"
-#: eq. (16), the model of whoever names none
-PLAIN = ModelSpec()
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class ShipInstruments:
 
 
 class SteeredShip:
-    """A ship of the simulator, steered order by order.
+    """A ship of the simulator, heading north, steered order by order.
 
     Parameters
     ----------
@@ -41,8 +41,6 @@ class SteeredShip:
         Wind and stream.
     longest_s : float
         How long she can be steered.
-    course_rad : float
-        Heading at the start.
     seed : int
         Of wind, stream and noise; equal seeds give equal weather and noise whatever the law does.
     instruments : ShipInstruments, optional
@@ -56,7 +54,6 @@ class SteeredShip:
         environment: Environment,
         longest_s: float,
         *,
-        course_rad: float = 0.0,
         seed: int = 0,
         instruments: ShipInstruments | None = None,
         gear: SteeringGear | None = None,
@@ -66,7 +63,7 @@ class SteeredShip:
         self._hull, self._constants = hull, hull_constants(hull)
         self._noise, self._row = instruments or ShipInstruments(), 0
         self._state, self._rudder, self._order = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
-        self._state[0, 2], self._state[0, 5] = course_rad, hull.trial_speed_m_s
+        self._state[0, 5] = hull.trial_speed_m_s
         self._forcing = environment.forcing(n, GRID_S, seed)
         self._random = stream(seed, "steered ship")
         self._gear, self._felt = gear, 0.0

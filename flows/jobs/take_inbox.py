@@ -57,11 +57,11 @@ class InboxRun:
     #: Files that were known and have not changed.
     known: int
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the run as JSON content."""
         return {
             "inbox": self.address,
-            "ingested": [outcome.show() for outcome in self.ingested],
+            "ingested": [outcome.as_json() for outcome in self.ingested],
             "quarantined": [{**quarantine_json(file), "new": file.address in self.tried} for file in self.quarantined],
             "waiting": list(self.waiting),
             "known": self.known,
@@ -84,7 +84,7 @@ class NeedsAPerson(DataRejected):
             "files_in_quarantine",
             f"{count} of {run.address} cannot be placed or read: {', '.join(names[:5])}{' ...' if names[5:] else ''}.",
             "`kempf logs quarantine` says of each why, and what to do.",
-            run.show(),
+            run.as_json(),
         )
 
 
@@ -198,12 +198,12 @@ class _Folders:
         """Return what is to be stored of them: those that cannot be read, and those that could not before."""
         broken = [_quarantined(file, None, error, None) for file, error in self.unreadable.values()]
         bad = {row.address for row in broken}
-        mended = [
+        repaired = [
             InboxFile(file.address, file.size_bytes, file.modified_utc_ns, "ingested")
             for file in self.files.values()
             if file.address in before and file.address not in bad
         ]
-        return broken + mended
+        return broken + repaired
 
 
 def _read_folders(folder: SourceFolder, files: Sequence[SourceFile]) -> _Folders:

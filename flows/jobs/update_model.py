@@ -181,7 +181,7 @@ def _updating(inputs: Inputs, before: ParameterSet) -> Inputs:
     """Return the inputs of further manoeuvres with the set that is brought forward by them."""
     at_once = before.updates.fitted_at_once if before.updates else len(before.segment_ids)
     update = Update(before.parameter_set_id, len(before.segment_ids), at_once)
-    return replace(inputs, settings={**inputs.settings, UPDATES: update.show()})
+    return replace(inputs, settings={**inputs.settings, UPDATES: update.as_json()})
 
 
 def _brought(
@@ -280,7 +280,7 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
             "gross_errors": then["gross_errors"] + gross_errors,
             "held_out": [],
             "left_out": skipped,
-            POSTERIOR: {**behind.show(), "slip_m": then[POSTERIOR]["slip_m"]},
+            POSTERIOR: {**behind.as_json(), "slip_m": then[POSTERIOR]["slip_m"]},
             **(
                 {"widened": update.agreement.widened}
                 if errors.of_effects

@@ -259,7 +259,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             **result.convergence,
             "held_out": [run.name for run in step.held],
             "left_out": skipped,
-            POSTERIOR: {**left_behind.show(), "slip_m": common_slip([filtered.run for filtered in fit.runs])},
+            POSTERIOR: {**left_behind.as_json(), "slip_m": common_slip([filtered.run for filtered in fit.runs])},
             **(
                 {} if effects or len(plain.alone) < 2 else {"pooling": pooling(plain.agreement, plain.alone, plain.fit)}
             ),

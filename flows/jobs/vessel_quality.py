@@ -27,7 +27,7 @@ class Finding:
     #: Segments that it is about.
     segment_ids: tuple[str, ...] = ()
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {**asdict(self), "segment_ids": list(self.segment_ids)}
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse import runs, said
+from kempf.warehouse import append_only, runs
 from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
@@ -36,7 +36,7 @@ class VesselReport:
     #: What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
     #: refused, so that the same data are refused again; ``known`` that the run before reported it already.
     failures: list[dict[str, Any]] = field(default_factory=list)
-    #: What is wrong with her logs and models as they are stored now, `kempf.flows.jobs.vessel_quality.Finding.show`.
+    #: What is wrong with her logs and models as they are stored now, `kempf.flows.jobs.vessel_quality.Finding.as_json`.
     findings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -46,14 +46,14 @@ class VesselReport:
             return "failed"
         return "changed" if self.reread or self.searched or self.new_sets else "unchanged"
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the report as JSON content."""
         return {"vessel": self.vessel, "status": self.status, **{k: v for k, v in vars(self).items() if k != "vessel"}}
 
     def fail(self, what: str, error: KempfError) -> None:
         """Write down a failure and go on."""
         lasting = isinstance(error, DataRejected)
-        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.to_json()})
+        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.as_json()})
 
     def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> FlowRun:
         """Return the line of the table ``runs``.
@@ -123,7 +123,7 @@ def remember_history(warehouse: Warehouse, reports: Sequence[VesselReport], flow
         if report.status != "unchanged"
     ]
     if rows:
-        said.add(warehouse, "run_history", *rows)
+        append_only.add(warehouse, "run_history", *rows)
 
 
 def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:

@@ -28,6 +28,8 @@ from kempf.warehouse.store import Warehouse
 _SIDE, _STEP = 4, 1.0
 #: of the estimate, between two values, where it has no standard error
 _SHARE = 0.1
+#: of a drawn series
+MOST_INSTANTS = 150
 _UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 
 
@@ -45,7 +47,7 @@ class Tried:
     #: Shape (n, 3). Predicted, columns `kempf.pipeline.predict.free_run.CHANNELS`; NaN where it runs away.
     predicted: Float
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content, without the series."""
         return {name: value for name, value in vars(self).items() if name != "predicted"}
 
@@ -66,7 +68,7 @@ class WhatIf:
     #: Whether the parameters are those fitted to legs, which predictions take.
     by_legs: bool = False
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
         return {
             "vessel": self.vessel,
@@ -79,7 +81,7 @@ class WhatIf:
             "std": self.std,
             "fitted_to_legs": self.by_legs,
             "others": "held as they are: fitted anew beside it, a value costs less",
-            "tried": [attempt.show() for attempt in self.tried],
+            "tried": [attempt.as_json() for attempt in self.tried],
         }
 
     def measured(self) -> dict[str, Float]:
@@ -204,8 +206,8 @@ def _log_likelihood(bound_runs: BoundRuns, place: int, by: float) -> float:
     return float(sum(passed(run.filtered, Point(hull, values, run.levels.own)).log_likelihood for run in fitted))
 
 
-def series_of(answer: WhatIf, most: int) -> Mapping[str, Any]:
-    """Return what is drawn of it as JSON content, at most so many instants.
+def series_of(answer: WhatIf) -> Mapping[str, Any]:
+    """Return what is drawn of it as JSON content, at most `MOST_INSTANTS` instants.
 
     Returns
     -------
@@ -214,7 +216,7 @@ def series_of(answer: WhatIf, most: int) -> Mapping[str, Any]:
         mapping for each value tried.
     """
     measured = answer.measured()
-    step = max(1, -(-measured["time_s"].size // most))
+    step = max(1, -(-measured["time_s"].size // MOST_INSTANTS))
 
     def thinned(columns: Mapping[str, Float]) -> dict[str, list[float | None]]:
         return {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
@@ -16,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Variable that names the file, and its name where nobody names one.
 FILE_VARIABLE, FILE = "KEMPF_CONFIG", "kempf.toml"
+#: Folder of the warehouse where nobody names one.
+DEFAULT_WAREHOUSE = "kempf-data"
 
 
 @dataclass(frozen=True)
@@ -28,20 +29,18 @@ class Setting:
     #: The variable or the file that sets it; None where nothing does.
     source: str | None
 
-    def show(self) -> dict[str, str | None]:
+    def as_json(self) -> dict[str, str | None]:
         """Return the setting as JSON content."""
         return dict(vars(self))
 
 
-def setting(name: str, environment: Mapping[str, str] | None = None) -> str | None:
+def setting(name: str) -> str | None:
     """Return a setting, None where nothing sets it.
 
     Parameters
     ----------
     name : str
         Of `schemas.settings.VARIABLES`.
-    environment : mapping of str, optional
-        Instead of that of the process.
 
     Raises
     ------
@@ -50,12 +49,17 @@ def setting(name: str, environment: Mapping[str, str] | None = None) -> str | No
     UsageError
         ``configuration_invalid``, ``secret_in_configuration``, ``log_level_unknown``.
     """
-    return in_force(name, environment).value
+    return in_force(name).value
 
 
-def log_level(environment: Mapping[str, str] | None = None) -> str | None:
+def configured_warehouse() -> str:
+    """Return the address of the warehouse that is set, else the default one; errors are those of `setting`."""
+    return setting("warehouse") or DEFAULT_WAREHOUSE
+
+
+def log_level() -> str | None:
     """Return from which level on something is logged, None where nothing sets it; errors are those of `setting`."""
-    level = in_force("log_level", environment)
+    level = in_force("log_level")
     if level.value is not None and level.value not in get_args(LogLevel):
         raise UsageError(
             "log_level_unknown",
@@ -66,13 +70,12 @@ def log_level(environment: Mapping[str, str] | None = None) -> str | None:
     return level.value
 
 
-def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting:
+def in_force(name: str) -> Setting:
     """Return a setting with what sets it; the parameters and errors are those of `setting`."""
-    variables = os.environ if environment is None else environment
     variable = VARIABLES[name]
-    if variables.get(variable):
-        return Setting(name, variables[variable], variable)
-    path = file_of(variables)
+    if os.environ.get(variable):
+        return Setting(name, os.environ[variable], variable)
+    path = file_of()
     if path is None:
         return Setting(name, None, None)
     from kempf.schemas.configuration import value_of
@@ -81,9 +84,9 @@ def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting
     return Setting(name, value, str(path) if value is not None else None)
 
 
-def every(environment: Mapping[str, str] | None = None) -> list[Setting]:
+def every() -> list[Setting]:
     """Return all settings; errors are those of `setting`."""
-    return [in_force(name, environment) for name in VARIABLES]
+    return [in_force(name) for name in VARIABLES]
 
 
 def _read(path: Path) -> Configuration:
@@ -112,9 +115,9 @@ def _read(path: Path) -> Configuration:
     return parse(content, str(path))
 
 
-def file_of(environment: Mapping[str, str]) -> Path | None:
+def file_of() -> Path | None:
     """Return the file that is in force, None where there is none; raises ``no_configuration``."""
-    named = environment.get(FILE_VARIABLE)
+    named = os.environ.get(FILE_VARIABLE)
     if named:
         path = Path(named).expanduser()
         if not path.is_file():
@@ -125,6 +128,6 @@ def file_of(environment: Mapping[str, str]) -> Path | None:
                 {"path": named},
             )
         return path
-    home = environment.get("XDG_CONFIG_HOME") or "~/.config"
+    home = os.environ.get("XDG_CONFIG_HOME") or "~/.config"
     places = (Path(FILE), Path(home).expanduser() / "kempf" / FILE)
     return next((place.absolute() for place in places if place.is_file()), None)

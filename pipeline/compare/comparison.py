@@ -10,7 +10,7 @@ import numpy as np
 
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.compare.overshoot import OvershootError
-from kempf.pipeline.predict.median_error import median_error
+from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
 from kempf.pipeline.predict.prediction import Predicted
 from kempf.pipeline.predict.run_residuals import RunResiduals
 
@@ -64,7 +64,7 @@ class ComparedRun:
         """The error in percent."""
         return 100.0 * self.free_run_error
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
         predicted = self.predicted
         rms = predicted.rms()
@@ -221,7 +221,7 @@ def _finite(error: float) -> float | None:
 def _errors(errors: Sequence[float]) -> dict[str, float | None]:
     """Return mean, standard error and median in percent, and how many runs leave the measured course altogether."""
     summed = _in_percent({**_mean(errors), "median": _finite(median_error(errors)) if errors else None})
-    return {**summed, "off": sum(not error < 1.0 for error in errors)}
+    return {**summed, "off": sum(not error < LEFT_THE_COURSE for error in errors)}
 
 
 def _in_percent(mean: dict[str, float | None]) -> dict[str, float | None]:

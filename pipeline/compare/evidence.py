@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from kempf.schemas.enumeration import as_words
+
 #: probability below which something is said, and how many are
 LEVEL, MOST = 0.01, 12
 #: samples with their words, the more telling first
@@ -69,22 +71,22 @@ def _of_sample(sample: str, misfit: Mapping[str, Any]) -> Iterator[Evidence]:
     for entry in misfit["stands_out"]:
         of, which, channel = entry["of"], str(entry["which"]), entry["channel"]
         yield Evidence(
-            f"errors of {_words(channel)} are {entry['whitened_rms']:.2f} times as large as the model says: "
-            f"{_words(of.removeprefix('by_').removeprefix('bin '))} {_words(which)}",
+            f"errors of {as_words(channel)} are {entry['whitened_rms']:.2f} times as large as the model says: "
+            f"{as_words(of.removeprefix('by_').removeprefix('bin '))} {as_words(which)}",
             *(sample, channel, of, which, float(entry["p_adjusted"])),
             strength=entry["n"] * entry["whitened_rms"] ** 2,
         )
     for channel, entry in misfit["correlations"].items():
         own = entry["auto"]["p_value"]
         if own is not None and own < LEVEL:
-            words = f"errors of {_words(channel)} one step ahead are correlated in time"
+            words = f"errors of {as_words(channel)} one step ahead are correlated in time"
             lag_s = float(entry["auto"]["largest_lag_s"] or 0.0)
             rho = abs(entry["auto"]["largest"] or 0.0)
             yield Evidence(words, sample, channel, "correlation", ITSELF, float(own), lag_s, rho)
         for name, cross in entry["cross"].items():
             if cross["largest"] is not None and cross["p_adjusted"] < LEVEL:
                 words = (
-                    f"errors of {_words(channel)} go with {_words(name)}, {cross['largest_lag_s']:g} s before: "
+                    f"errors of {as_words(channel)} go with {as_words(name)}, {cross['largest_lag_s']:g} s before: "
                     f"correlation {cross['largest']:+.2f}"
                 )
                 p, lag_s = float(cross["p_adjusted"]), float(cross["largest_lag_s"])
@@ -96,11 +98,8 @@ def _of_sample(sample: str, misfit: Mapping[str, Any]) -> Iterator[Evidence]:
             most = max(out, key=lambda band: float(band["ratio"]))
             bounds = f"{most['low_hz']:g} and {most['high_hz']:g} Hz"
             words = (
-                f"errors of {_words(channel)} have {most['ratio']:.1f} times the power of white noise between {bounds}"
+                f"errors of {as_words(channel)} have {most['ratio']:.1f} times the power of white noise between "
+                f"{bounds}"
             )
             p = min(1.0, float(count * most["p_value"]))
             yield Evidence(words, sample, channel, "band", bounds, p, strength=float(most["ratio"]))
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")

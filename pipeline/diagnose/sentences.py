@@ -17,7 +17,7 @@ from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
 from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.pipeline.diagnose.verdict import share_explained, share_of_given, verdict
 from kempf.pipeline.predict.free_run import FreeRun
-from kempf.pipeline.predict.median_error import median_error
+from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
 from kempf.schemas.enumeration import at_the_beginning, listed
 
 #: share of the misfit below which nothing of it is explained
@@ -232,7 +232,7 @@ def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
         for name, a, b in zip(("fitted", "held-out"), before, after, strict=True)
         if b
     ]
-    off = [run.name for run in last.by_legs if not run.relative_error < 1.0]
+    off = [run.name for run in last.by_legs if not run.relative_error < LEFT_THE_COURSE]
     sentence = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
     assert last.ahead is not None
     if not _keeps_course(last.ahead.fit.hull):

@@ -50,7 +50,7 @@ class Posterior:
         """Whether every parameter is known: one at a bound has no parabola."""
         return bool(np.all(np.isfinite(self.covariance)) and np.all(np.isfinite(self.stated)))
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "names": list(self.names),
@@ -65,7 +65,7 @@ class Posterior:
 
 
 def from_json(content: Mapping[str, Any]) -> Posterior:
-    """Return what `Posterior.show` gave; what was not finite there is NaN."""
+    """Return what `Posterior.as_json` gave; what was not finite there is NaN."""
 
     def array(name: str) -> Float:
         return np.array(content[name], dtype=np.float64)

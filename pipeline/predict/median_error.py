@@ -1,10 +1,13 @@
-"""The middle error of several free runs, some of which may run off."""
+"""The middle error of several free runs, some of which may leave the measured course."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from math import inf, isnan, nan
 from statistics import median
+
+#: Error of a free run, as a share of the motion, from which it has left the measured course.
+LEFT_THE_COURSE = 1.0
 
 
 def median_error(errors: Iterable[float]) -> float:

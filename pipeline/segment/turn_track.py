@@ -12,12 +12,10 @@ import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
+from kempf.pipeline.channels.positions import EARTH_M, plane
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 
 Source = Literal["positions", "speed and course over ground", "speed through the water and heading", "heading alone"]
-
-#: Semi-major axis of the earth, m, and the square of its eccentricity (WGS 84).
-_EARTH_M, _EARTH_E2 = 6378137.0, 6.69437999014e-3
 
 #: No ship under way drifts more, rad: course or heading is wrong there.
 _LARGEST_DRIFT_RAD = float(np.pi / 3)
@@ -145,11 +143,11 @@ def _made(
     distance_std = float("nan")
     known = speed is not None and course is not None and bool(np.all(np.isfinite(speed) & np.isfinite(course)))
     if source == "positions":
-        north, east = _plane(columns["latitude"], columns["longitude"])
+        north, east = plane(columns["latitude"], columns["longitude"])
         distance_std = float(np.sqrt(2.0)) * max(
             noise_std(cut["latitude"]), noise_std(cut["longitude"]) * np.cos(float(columns["latitude"][0]))
         )
-        distance_std *= _EARTH_M
+        distance_std *= EARTH_M
         if not known:
             north_m_s, east_m_s = (_slope(time_s, column, quarter_s) for column in (north, east))
             speed, course = np.hypot(north_m_s, east_m_s), np.arctan2(east_m_s, north_m_s)
@@ -168,14 +166,6 @@ def _made(
         north, east = (_integral(time_s, speed * turned) for turned in (np.cos(along), np.sin(along)))
     log = columns.get("speed_through_water", np.full(time_s.size, np.nan))
     return TurnTrack(time_s, north, east, heading, speed, drift, log, source, distance_std, bridged)
-
-
-def _plane(latitude: Float, longitude: Float) -> tuple[Float, Float]:
-    """Return metres to north and east of the first position, by the radii of curvature there."""
-    w = 1.0 - _EARTH_E2 * np.sin(latitude[0]) ** 2
-    meridian, across = _EARTH_M * (1.0 - _EARTH_E2) / w**1.5, _EARTH_M / np.sqrt(w)
-    north = (latitude - latitude[0]) * meridian
-    return north, (longitude - longitude[0]) * across * np.cos(latitude[0])
 
 
 def _integral(time_s: Float, rate: Float) -> Float:

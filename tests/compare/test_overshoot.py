@@ -70,7 +70,7 @@ def test_the_summary_of_runs_keeps_the_samples_apart() -> None:
         compare_run(one, point, horizon_of("10s"), held_out=k == 2, turns=[Turn(1, 1, 60.0, 120.0, 5.0)])
         for k, one in enumerate(filtered)
     ]
-    shown = [run.show() for run in runs]
+    shown = [run.as_json() for run in runs]
     json.dumps(shown, allow_nan=False)
     assert [one["held_out"] for one in shown] == [False, False, True]
     assert [one["sample"] for one in shown] == ["fitted", "fitted", "held_out"]
@@ -96,8 +96,8 @@ def test_what_a_prediction_started_from_is_stated(asked: str, key: str) -> None:
     hull = truth_of(trial)
     filtered = sailed_by_model(run_of(trial, QUIET), hull)
     run = compare_run(filtered, Point(hull, np.zeros(0), levels_of()), horizon_of(asked), held_out=True)
-    assert key in run.show()["started_from"]["initial_state"]
-    free = compare_run(filtered, Point(hull, np.zeros(0), levels_of()), horizon_of("free"), held_out=True).show()
+    assert key in run.as_json()["started_from"]["initial_state"]
+    free = compare_run(filtered, Point(hull, np.zeros(0), levels_of()), horizon_of("free"), held_out=True).as_json()
     assert set(free["started_from"]["initial_state"]) == {
         *("lateral_speed_m_s", "yaw_rate_deg_s", "heading_from_first_deg"),
     }

@@ -10,7 +10,7 @@ import pytest
 from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination, examine
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome
-from kempf.pipeline.channels.doctor.verdict import as_content
+from kempf.pipeline.channels.doctor.verdict import as_json
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from tests.doctor import closed_form_ship
 
@@ -182,14 +182,14 @@ def test_every_correction_that_is_named_takes_its_contradiction_away() -> None:
 def test_what_no_single_correction_takes_away_is_said_with_its_figures() -> None:
     figure = Figure("ratio", 3.0, 0.1, 0.8, 1.25)
     outcome = Outcome("heading_rate", ("heading", "yaw_rate"), "disagree", "three times too much", (figure,))
-    content = as_content(Examination((ChannelFinding((), (outcome,)),), (outcome,), ()), {}, "delimited")
+    content = as_json(Examination((ChannelFinding((), (outcome,)),), (outcome,), ()), {}, "delimited")
     (finding,) = content["findings"]
     assert "no single correction takes the contradiction away" in finding["words"]
     assert finding["evidence"][0]["figures"][0]["value"] == 3.0
 
 
 def test_the_scale_of_the_rudder_is_said_not_to_be_seen() -> None:
-    found = as_content(examine(closed_form_ship.log()), {}, "delimited")
+    found = as_json(examine(closed_form_ship.log()), {}, "delimited")
     assert any("scale of rudder_angle" in words for words in found["cannot_see"])
-    assert as_content(examine(closed_form_ship.log("heading", "yaw_rate")), {}, "delimited")["cannot_see"] == []
+    assert as_json(examine(closed_form_ship.log("heading", "yaw_rate")), {}, "delimited")["cannot_see"] == []
     assert found["moves"] is True

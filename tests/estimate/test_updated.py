@@ -47,7 +47,7 @@ def test_a_further_run_gives_what_all_of_them_give_at_once(before: Posterior) ->
 
 
 def test_the_workers_and_the_way_through_json_do_not_matter_to_the_bits(before: Posterior) -> None:
-    first, second = brought(before, run(25), workers=1), brought(from_json(before.show()), run(25), workers=3)
+    first, second = brought(before, run(25), workers=1), brought(from_json(before.as_json()), run(25), workers=3)
     assert first is not None and second is not None
     np.testing.assert_array_equal(first.fit.hull, second.fit.hull)
     np.testing.assert_array_equal(first.known.covariance, second.known.covariance)
@@ -109,4 +109,4 @@ def test_a_parameter_at_a_bound_leaves_nothing_to_build_on(before: Posterior) ->
     covariance = before.covariance.copy()
     covariance[2] = covariance[:, 2] = np.nan
     at_bound = replace(before, covariance=covariance)
-    assert before.usable and not at_bound.usable and not from_json(at_bound.show()).usable
+    assert before.usable and not at_bound.usable and not from_json(at_bound.as_json()).usable

@@ -51,7 +51,7 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     before = history.standing(warehouse, "mariner")
     assert before and not plan(warehouse, None, changed_only=True).due
     planned = plan_for(warehouse, zigzag.segment_id[:10], "exclude", "the engine was slowed down")
-    assert set(planned.following.set_ids) == set(before) and planned.following.current
+    assert set(planned.affected.set_ids) == set(before) and planned.affected.current
     assert segments.current(warehouse, "mariner") == [zigzag]  # nothing is stored yet
     planned.store(warehouse)
     assert segments.current(warehouse, "mariner") == []
@@ -100,7 +100,7 @@ def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse
     # the approach that is left counts as one: the first leg has no overshoot
     assert len(planned.after.overshoots_deg) == len(zigzag.overshoots_deg)
     assert planned.after.overshoots_deg == pytest.approx(zigzag.overshoots_deg, abs=0.1)
-    assert planned.doubts == () and planned.show()["doubts"] == []
+    assert planned.doubts == () and planned.as_json()["doubts"] == []
     (doubt,) = replace(planned, after=replace(planned.after, overshoots_deg=(3.0, -1.8))).doubts
     assert doubt.startswith("overshoot 2 (-1.8 deg) is negative: she turned back before she was ")
     planned.store(warehouse)

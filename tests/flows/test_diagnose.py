@@ -18,7 +18,7 @@ from kempf.flows.fleet.flows import diagnose_batch
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import code_changed, inputs_of, rerun
-from kempf.flows.jobs.standing_model import PLAIN
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
@@ -81,9 +81,9 @@ def test_the_command_keeps_the_keys_that_people_script_against(late: Late, diagn
 
 
 def test_what_was_diagnosed_is_not_computed_again(late: Late, diagnosed: dict[str, Any]) -> None:
-    found, new = diagnose_vessel(late.warehouse, VESSEL, PLAIN)
+    found, new = diagnose_vessel(late.warehouse, VESSEL, ModelSpec())
     assert not new and found.diagnosis_id == diagnosed["diagnosis_id"]
-    assert found.show() == diagnosed
+    assert found.as_json() == diagnosed
     text = late.kempf("diagnose", "--vessel", VESSEL)
     assert text.code == 0 and f"{VESSEL}: explained" in text.out and "next: kempf effects add rudder_lag" in text.out
 
@@ -159,7 +159,7 @@ def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, diagnosed: 
 
 def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, diagnosed: dict[str, Any]) -> None:
     with disable_run_logger():
-        found = diagnose_batch.fn(late.warehouse.uri, ["nobody", VESSEL], PLAIN.model_dump(mode="json"))
+        found = diagnose_batch.fn(late.warehouse.uri, ["nobody", VESSEL], ModelSpec().model_dump(mode="json"))
     assert [one["verdict"] for one in found] == ["failed", "explained"]
     assert [row["effects"] for row in summary(found)] == ["", "rudder_lag"]
 

@@ -7,11 +7,12 @@ from itertools import pairwise
 import pytest
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
 from kempf.flows.jobs.vessel_model import errors_in_words, store_model
 from kempf.flows.process.fit_report import FitReport, reported_to
 from kempf.flows.process.progress import Figures, silent
 from kempf.pipeline.estimate.iteration import SILENT, Iteration
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
@@ -43,7 +44,7 @@ def two_days(tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
 
 def test_a_model_is_seen_being_fitted_and_its_last_figures_are_those_stored(two_days: Warehouse):
     kept = Kept()
-    spec = PLAIN.model_copy(update={"effects": ("gyro_bias",)})
+    spec = ModelSpec().model_copy(update={"effects": ("gyro_bias",)})
     made, new = store_model(two_days, choose(two_days, "ferry"), spec, NONE_OF_ONES_OWN, kept)
     assert new
     figures = [one for _, one in kept.figures]

@@ -10,12 +10,12 @@ import pytest
 
 from kempf.flows.fleet import plan as planning
 from kempf.flows.fleet import report as fleet_report
-from kempf.flows.fleet import state
 from kempf.flows.fleet.plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
-from kempf.flows.fleet.state import fleet_state as state_of
+from kempf.flows.jobs import vessel_state
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest_log
 from kempf.flows.jobs.vessel_report import VesselReport, run_id_of
+from kempf.flows.jobs.vessel_state import fleet_state as state_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
@@ -80,7 +80,7 @@ def test_everything_that_a_result_rests_on_makes_her_due(own: Warehouse, ferry: 
     assert due(own) == ["idle"]
     do_fleet(own)
     assert due(own) == []
-    monkeypatch.setattr(state.code_version, "fingerprint", lambda _: "0" * 16)
+    monkeypatch.setattr(vessel_state.code_version, "fingerprint", lambda _: "0" * 16)
     assert due(own) == ["ferry", "idle"]
 
 
@@ -192,23 +192,23 @@ def test_a_lost_batch_is_reported_and_tried_again_and_other_code_is_refused(own:
     at = versions(own)
     refused = do_batch(own, ["ferry"], changed_only=True, code=["another", "version"])
     assert refused[0]["failures"][0]["error"]["code"] == "other_code" and versions(own) == at
-    assert do_batch(own, ["ferry"], changed_only=True, code=state.responsible_code())[0]["failures"] == []
+    assert do_batch(own, ["ferry"], changed_only=True, code=vessel_state.responsible_code())[0]["failures"] == []
 
 
 def test_a_large_fleet_has_a_table_of_those_where_something_happened() -> None:
-    calm = [VesselReport(f"v{k}").show() for k in range(fleet_report.MOST_ROWS)]
+    calm = [VesselReport(f"v{k}").as_json() for k in range(fleet_report.MOST_ROWS)]
     assert len(fleet_report.table(calm)) == fleet_report.MOST_ROWS
     loud = VesselReport("loud", new_sets=1)
     loud.fail("a|b", KempfError("x", "Two\nlines.", "Do."))
-    assert [row["vessel"] for row in fleet_report.table([*calm, loud.show()])] == ["loud"]
-    assert "| loud | a\\|b: Two lines. | this run | Do. |" in fleet_report.markdown([*calm, loud.show()])
+    assert [row["vessel"] for row in fleet_report.table([*calm, loud.as_json()])] == ["loud"]
+    assert "| loud | a\\|b: Two lines. | this run | Do. |" in fleet_report.markdown([*calm, loud.as_json()])
 
 
 def test_vessels_of_a_summary_link_to_their_pages() -> None:
     reports = [VesselReport(name) for name in ("Ferry One", "loud")]
     for one in reports:
         one.fail("reading", KempfError("x", "Broken.", "Do."))
-    text = fleet_report.markdown([one.show() for one in reports], pages="http://ship:8899/")
+    text = fleet_report.markdown([one.as_json() for one in reports], pages="http://ship:8899/")
     assert "| [loud](http://ship:8899/v/loud) | reading: Broken." in text
     assert f"[Ferry One](http://ship:8899{of_vessel('Ferry One')})" in text and "/v/~ferry-one-" in text
 

@@ -148,7 +148,7 @@ def test_an_inbox_that_is_none(tmp_path: Path, warehouse: Warehouse) -> None:
         taken(tmp_path / "file", warehouse)
     assert file.value.code == "inbox_path"
     (tmp_path / "empty").mkdir()
-    assert taken(tmp_path / "empty", warehouse).show()["known"] == 0 and not warehouse.exists()
+    assert taken(tmp_path / "empty", warehouse).as_json()["known"] == 0 and not warehouse.exists()
 
 
 def test_a_folder_that_was_renamed_waits_for_nobody_any_more(place: Path, mariner: Ship, warehouse: Warehouse) -> None:

@@ -107,7 +107,7 @@ def test_identify_stores_each_set_once_points_to_the_last_and_builds_it_again(st
     assert aliases.of_vessel(stocked, "mariner") == current
 
 
-def test_other_settings_or_another_model_make_another_set(stocked: Warehouse):
+def test_another_model_makes_another_set(stocked: Warehouse):
     asked = [LEAST_SQUARES, Request(ModelSpec(name="other"), "least-squares"), Request(ModelSpec(), "least-squares")]
     made = [identify_vessel(stocked, "mariner", request) for request in asked]
     ids = [o.parameter_set.parameter_set_id for outcomes in made for o in outcomes if o.parameter_set]

@@ -35,7 +35,7 @@ def test_two_models_that_a_sailed_zigzag_parts_are_parted_by_one_more(
     lag, plain = found["rudder_lag",], found[()]
     monkeypatch.setattr(predict_vessel, "rivals_of", lambda *_: Rivals((plain,), ()))
     made = next_trial(warehouse, VESSEL, lag.parameter_set_id)
-    content = made.show()
+    content = made.as_json()
     assert content["aim"] == "part" and [one["effects"] for one in content["models"]] == [["rudder_lag"], []]
     assert "(rudder_lag or none beside)" in content["sentences"][0]
     surest = [one["probability"] for one in content["trials"]]

@@ -8,7 +8,6 @@ from shutil import copytree
 
 import pytest
 
-from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs import remove_logs
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
@@ -20,6 +19,7 @@ from kempf.flows.jobs.ship_model import ship_of_set
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, inputs_of
 from kempf.flows.jobs.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.vessel_state import fleet_state
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile

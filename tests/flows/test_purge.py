@@ -160,7 +160,7 @@ def test_the_command_says_first_what_goes(warehouse: Warehouse) -> None:
     assert asked.code == 2 and "is deleted for good" in asked.err and "--yes" in asked.err
     assert purges.of_logs(warehouse) == {} and what_goes(warehouse, row.log_id, "by law").readings > 0
     done = kempf("purge", row.log_id, "--reason", "by law", "--yes", "--json", *at)
-    assert done.code == 0 and done.json == purges.of_logs(warehouse)[row.log_id].show()
+    assert done.code == 0 and done.json == purges.of_logs(warehouse)[row.log_id].as_json()
     refused(kempf("purge", "nothing", "--reason", "by law", "--yes", "--json", *at), 4, "no_log")
     blank = kempf("purge", row.log_id, "--reason", " ", "--yes", "--json", *at)
     refused(blank, 2, "no_reason")

@@ -174,7 +174,7 @@ def test_a_table_that_is_gone_and_a_raw_log_that_is_damaged(warehouse: Warehouse
     kept = warehouse.folder / "raw" / row.log_id[:2] / row.log_id
     flipped(kept)
     rmtree(warehouse.folder / "segments" / "_delta_log")
-    table_cache.forget()
+    table_cache._kept.clear()
     assert {one.table for one in verify(warehouse)} >= {"raw", "segments"}
     done = repair(warehouse)
     assert [one.table for one in done.left] == ["raw"]
@@ -196,14 +196,14 @@ def test_a_removed_log_stays_removed_and_a_moved_one_where_it_was_moved(warehous
     (ferry,) = logs.current(warehouse, "ferry")
     remove(warehouse, [ferry], "not hers")
     flipped(newest(warehouse, "logs"))
-    table_cache.forget()
+    table_cache._kept.clear()
     assert repair(warehouse).left == []
     assert [row.removed for row in logs.removed(warehouse, "ferry")] == ["not hers"]
     assert logs.current(warehouse, "ferry") == []
     restore(warehouse, ferry.log_id)
     move(warehouse, ferry.log_id, "mariner", "copied into the wrong folder")
     flipped(newest(warehouse, "logs"))
-    table_cache.forget()
+    table_cache._kept.clear()
     assert repair(warehouse).left == []
     assert ferry.log_id in {row.log_id for row in logs.current(warehouse, "mariner")}
     assert (raw.described(warehouse, ferry.log_id) or {})["vessel"] == "mariner"
@@ -234,7 +234,7 @@ def test_profiles_come_again_and_what_was_current_stays(warehouse: Warehouse) ->
     remove_vessel(warehouse, "ferry", "a rehearsal")
     for path in before:
         flipped(path)
-    table_cache.forget()
+    table_cache._kept.clear()
     assert repair(warehouse).left == []
     assert vessels.names(warehouse) == ["mariner"] and vessels.current(warehouse, "mariner").length_m == 99.0
 

@@ -10,8 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.flows.fleet import state
-from kempf.flows.jobs import preview_code, rerun_all
+from kempf.flows.jobs import preview_code, rerun_all, vessel_state
 from kempf.flows.jobs.adopt_code import adopt_code
 from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
@@ -79,7 +78,7 @@ def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehous
     monkeypatch.setattr(rerun_all, "rebuilt", lambda *_: pytest.fail("built again"))
     version = delta.versions(own)["runs"]
     again = verify_all(own)
-    assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
+    assert (again.counts(), again.as_json()["known_before"]) == (found.counts(), 2)
     assert delta.versions(own)["runs"] == version
     assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
 
@@ -88,11 +87,11 @@ def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch:
     """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
     assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
     monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
-    state.deciding_code.cache_clear()
+    vessel_state.deciding_code.cache_clear()
     try:
-        assert verify_all(own).show()["known_before"] == 0
+        assert verify_all(own).as_json()["known_before"] == 0
     finally:
-        state.deciding_code.cache_clear()
+        vessel_state.deciding_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -116,7 +115,7 @@ def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: py
     found = verify_all(own)
     assert first.isdisjoint(built) and len(built) == 1
     assert found.counts() == {**NONE, "bit-identical": 2}
-    assert found.show()["known_before"] == 1
+    assert found.as_json()["known_before"] == 1
 
 
 def test_what_differs_and_what_cannot_be_built_is_reported(own: Warehouse):
@@ -307,7 +306,7 @@ def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Wareho
     assert again.code == 0 and "nothing to adopt" in again.out
     # taken back, everything is of other code again
     taken = kempf("rerun", "--unadopt", "--warehouse", own.uri, "--json")
-    assert {one["stage"] for one in taken.json["taken_back"]} == {one.stage for one in equivalents.all_of(own)}
+    assert {one["stage"] for one in taken.json["taken_back"]} == set(delta.read(own, "equivalents")["stage"])
     assert said_of_vessel(own, "mariner") is not None
     assert "nothing to take back" in kempf("rerun", "--unadopt", "--warehouse", own.uri).out
 
@@ -335,7 +334,7 @@ def test_a_search_that_finds_something_else_is_named_and_not_adopted(own: Wareho
     assert found.logs_otherwise == (rows[0].file_name,)
     with pytest.raises(KempfError) as caught:
         adopt_code(own, [found])
-    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    assert caught.value.code == "code_moves" and delta.read(own, "equivalents").is_empty()
     output = kempf("rerun", "--all", "--preview", "--warehouse", own.uri)
     assert f"in 1 of 2 logs other things are read or found: {rows[0].file_name}" in output.out
 
@@ -353,11 +352,11 @@ def test_the_fleet_looks_at_every_vessel_again_when_code_was_adopted_or_taken_ba
     own: Warehouse, monkeypatch: pytest.MonkeyPatch
 ):
     other_code(monkeypatch)
-    before = state.fleet_state(own)["mariner"].digest
+    before = vessel_state.fleet_state(own)["mariner"].digest
     adopt_code(own, preview_all(own))
-    adopted = state.fleet_state(own)["mariner"].digest
+    adopted = vessel_state.fleet_state(own)["mariner"].digest
     equivalents.withdraw(own)
-    assert adopted != before == state.fleet_state(own)["mariner"].digest
+    assert adopted != before == vessel_state.fleet_state(own)["mariner"].digest
 
 
 def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -366,5 +365,5 @@ def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: p
     moving = replace(found, gone=("ps-1",))
     with pytest.raises(KempfError) as caught:
         adopt_code(own, [moving])
-    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    assert caught.value.code == "code_moves" and delta.read(own, "equivalents").is_empty()
     assert kempf("rerun", "--all", "--adopt", "--warehouse", own.uri).code == 2

@@ -53,7 +53,7 @@ def test_a_long_log_leaves_what_a_short_one_leaves(
     request.getfixturevalue("cut")
     long, other = taken(ferry, tmp_path / "long")
     assert seen(long) == seen(short)
-    assert other.show() | {"path": ""} == one.show() | {"path": ""}
+    assert other.as_json() | {"path": ""} == one.as_json() | {"path": ""}
     found = channels_of(long, other.ingest_id)
     assert found.notes == wanted.notes
     for name, series in wanted.series.items():

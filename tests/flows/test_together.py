@@ -60,7 +60,7 @@ def test_one_commit_a_table_and_what_each_alone_would_make(own: Warehouse, tmp_p
     # a table that was not there is made by a commit of its own
     made = {name: after[name] - before.get(name, 0) for name in after if name != "vessels"}
     assert made == dict.fromkeys(written, 1)
-    assert [reprocess_vessel(alone, name).show() for name in FLEET] == [report.show() for report in together]
+    assert [reprocess_vessel(alone, name).as_json() for name in FLEET] == [report.as_json() for report in together]
     assert seen(alone) == seen(own)
     assert runs.all_runs(alone) == runs.all_runs(own)
     assert [r.status for r in reprocess_vessels(own, FLEET)] == ["unchanged"] * 3

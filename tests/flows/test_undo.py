@@ -8,8 +8,8 @@ import pytest
 
 from kempf.flows.fleet.plan import plan
 from kempf.flows.jobs import remove_logs
+from kempf.flows.jobs.affected_sets import of_logs
 from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.following import of_logs
 from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore

@@ -34,7 +34,7 @@ def test_parameters_are_stored_with_what_speaks_against_them(boat: Voyage) -> No
     assert outcome.error is None
     assert outcome.parameter_set is not None
     stored = parameter_sets.get(boat.warehouse, outcome.parameter_set.parameter_set_id)
-    assert stored.show() == outcome.parameter_set.show()
+    assert stored.as_json() == outcome.parameter_set.as_json()
     assert [p.name for p in stored.parameters] == ["a11", "a12", "a21", "a22", "b1", "b2"]
     assert all(p.std is not None and p.std > 0 for p in stored.parameters)
     assert stored.parameters[5].value > 0

@@ -11,7 +11,7 @@ from kempf.flows.jobs.compare_predicted import measured_beside
 from kempf.flows.jobs.compare_vessel import compare_vessel
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.predict_vessel import predict_vessel
+from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
 from kempf.flows.jobs.vessel_model import store_model
 from tests.real_data.voyage import Voyage
@@ -23,7 +23,7 @@ def test_circles_are_laid_beside_predictions_in_their_own_wind_and_way(pond: Voy
     vessel = pond.ship.name
     made, _ = store_model(pond.warehouse, choose(pond.warehouse, vessel), read_model(MODEL), NONE_OF_ONES_OWN)
     request = PredictRequest("turning-circle", made.parameter_set_id, 35.0)
-    predicted = predict_vessel(pond.warehouse, vessel, request, count=32)
+    predicted = predict_with(models_of_set(pond.warehouse, vessel, request), request, count=32)
     beside = measured_beside(pond.warehouse, predicted)
     assert sorted(one.side for one in beside) == ["port", "starboard", "starboard", "starboard"]
     assert {one.sample for one in beside} == {"held_out"}
@@ -38,7 +38,7 @@ def test_circles_are_laid_beside_predictions_in_their_own_wind_and_way(pond: Voy
     assert 0.95 < kept < 1.1
     assert std < 0.2
     # a free run is as far ahead: the comparison shows what those parameters make of it beside the likelihood's
-    compared = compare_vessel(pond.warehouse, vessel, made.parameter_set_id).show()["summary"]
+    compared = compare_vessel(pond.warehouse, vessel, made.parameter_set_id).as_json()["summary"]
     for sample in ("fitted", "held_out"):
         mean = compared[sample]
         assert mean["free_run_error_percent_fitted_to_legs"]["mean"] < 0.6 * mean["free_run_error_percent"]["mean"]

@@ -39,7 +39,7 @@ from kempf.warehouse import (
 )
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_month, chain
+from kempf.warehouse.migrations import by_month, chain, commits
 from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
@@ -139,7 +139,7 @@ def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket)
         with pytest.raises(KempfError) as caught:
             vessels.register(warehouse, "ferry", VesselProfile(vessel="ferry"))
         assert caught.value.code in ("warehouse_unreachable", "warehouse_not_writable"), caught.value
-        assert "testing" not in json.dumps(caught.value.to_json())
+        assert "testing" not in json.dumps(caught.value.as_json())
     with pytest.raises(NotFound, match="no warehouse"):
         vessels.names(Warehouse(f"{bucket.uri}/empty", bucket.settings))
 
@@ -227,22 +227,22 @@ def test_an_earlier_warehouse_is_brought_forward_in_a_bucket(
     with pytest.raises(KempfError, match="works with layout 4"):
         logs.current(warehouse)
     place = chain.forward(warehouse)
-    before = by_month.contents(place, "readings")
+    before = commits.contents(place, "readings", None, by="ingest_id", without="month")
     monkeypatch.setattr(by_month, "MOST_LOGS", 1)
     with monkeypatch.context() as cut_off:
         # another process compacts the table after the first log
-        commits, commit = [0], delta.append_alone
+        count, commit = [0], commits.append_alone
 
         def overtaken(*arguments: Any, **named: Any) -> None:
-            commits[0] += 1
-            if commits[0] == 3:
+            count[0] += 1
+            if count[0] == 3:
                 table = delta.open_table(place, "readings")
                 assert table is not None
                 rows = delta.rows(table, "readings")
                 delta.replace(table, "readings", iter([rows]), "month = '2025-05'")
             commit(*arguments, **named)
 
-        cut_off.setattr(delta, "append_alone", overtaken)
+        cut_off.setattr(commits, "append_alone", overtaken)
         with pytest.raises(KempfError) as caught:
             chain.migrate(warehouse, lambda done, total, what: None)
     assert caught.value.code == "warehouse_busy"

@@ -26,7 +26,7 @@ def rows(first: int) -> pl.DataFrame:
 
 def test_a_large_frame_is_handed_on_in_small_batches() -> None:
     schema = arrow_schema(TABLES["rejected"])
-    batches = list(delta._batches(iter([rows(0), rows(ROWS)]), schema))
+    batches = list(delta.batches(iter([rows(0), rows(ROWS)]), schema))
     assert max(batch.num_rows for batch in batches) <= 16_384
     assert [n for batch in batches for n in batch.column("record").to_pylist()] == list(range(2 * ROWS))
     assert all(batch.schema.equals(schema) for batch in batches)

@@ -19,7 +19,7 @@ from kempf.warehouse import aliases, delta, parameter_sets, readings, seals, tab
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.keys import earlier_key
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_month, chain, to_3
+from kempf.warehouse.migrations import by_month, chain, commits, to_3
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import Problem, verify
 from tests.flows.content import seen
@@ -49,7 +49,7 @@ def _earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
         for one in (*given, delivery("boreas", b"june", readings=june)):
             deposit(warehouse, [one])
     warehouse.mark(Marker(2))
-    table_cache.forget()
+    table_cache._kept.clear()
     return folder
 
 
@@ -102,7 +102,7 @@ class Another:
 
 def before_commit(monkeypatch: pytest.MonkeyPatch, number: int, action: Callable[[], None]) -> None:
     """Let something happen right before the so-many-th commit of the migration, after it read the table."""
-    left, commit = [number], delta.append_alone
+    left, commit = [number], commits.append_alone
 
     def meanwhile(*arguments: Any, **named: Any) -> None:
         left[0] -= 1
@@ -110,7 +110,7 @@ def before_commit(monkeypatch: pytest.MonkeyPatch, number: int, action: Callable
             action()
         commit(*arguments, **named)
 
-    monkeypatch.setattr(delta, "append_alone", meanwhile)
+    monkeypatch.setattr(commits, "append_alone", meanwhile)
 
 
 def test_it_is_brought_forward_and_says_the_same(warehouse: Warehouse) -> None:
@@ -237,11 +237,11 @@ def folders_on_disk(warehouse: Warehouse) -> set[str]:
 def test_a_damaged_marker_does_not_bring_it_forward(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     (warehouse.folder / "kempf-warehouse.json").write_text("{")
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=2)
-    assert not chain.mend_marker(warehouse)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=2)
+    assert not chain.repair_marker(warehouse)
     chain.migrate(warehouse, look)
     (warehouse.folder / "kempf-warehouse.json").unlink()
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
 
 
 def test_every_commit_is_sealed(warehouse: Warehouse) -> None:

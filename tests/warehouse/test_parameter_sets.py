@@ -55,7 +55,7 @@ def test_another_content_under_one_id_is_refused(warehouse: Warehouse) -> None:
     assert "numpy" in caught.value.message
     assert caught.value.details["differences"][0]["field"] == "parameters.a11.value"
     assert parameter_sets.summaries(warehouse).height == 1  # the fresh one waits for the quarrel to end
-    json.dumps(caught.value.to_json(), allow_nan=False)
+    json.dumps(caught.value.as_json(), allow_nan=False)
 
 
 def test_the_id_is_a_function_of_every_input() -> None:
@@ -90,7 +90,7 @@ def test_ids_may_be_shortened_while_they_are_unique(warehouse: Warehouse) -> Non
 
 
 def test_it_shows_itself_as_json(warehouse: Warehouse) -> None:
-    shown = parameter_set().show()
+    shown = parameter_set().as_json()
     keys = {"parameter_set_id", "vessel", "model", "estimator", "parameters", "noise", "fit", "provenance"}
     assert keys <= shown.keys()
     assert shown["parameters"]["a11"] == {"value": -0.1, "std": 0.01, "unit": "1/m"}

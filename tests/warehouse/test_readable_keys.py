@@ -33,7 +33,7 @@ from kempf.warehouse import segments as segment_table
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_name, chain
+from kempf.warehouse.migrations import by_name, chain, commits
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
 from tests.flows.content import seen
@@ -105,7 +105,7 @@ def _layout_3(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 delta.replace(table, "lost", [one], f"vessel = '{vessel}'")
         purges.add(warehouse, purges.Purge("aurora", "e" * 64, "gone.csv", 1, 2, 3, 4, "end of the charter"))
     warehouse.mark(Marker(3))
-    table_cache.forget()
+    table_cache._kept.clear()
     return folder
 
 
@@ -139,7 +139,10 @@ def test_every_table_says_the_same_under_readable_keys(warehouse: Warehouse, mon
         pairs = delta.read(warehouse, name).select("vessel_key", "vessel").unique().rows()
         assert all(key == vessel_key(vessel) for key, vessel in pairs), name
         # at any moment every row was there once
-        contents = [by_name.contents(warehouse, name, v) for v in range(first[name], delta.versions(warehouse)[name])]
+        contents = [
+            commits.contents(warehouse, name, v, by="vessel", without="vessel_key")
+            for v in range(first[name], delta.versions(warehouse)[name])
+        ]
         assert all(one == contents[0] for one in contents), name
         table = delta.open_table(warehouse, name)
         assert table is not None
@@ -170,7 +173,7 @@ class Another:
 
 def before_exchange(patched: pytest.MonkeyPatch, table: str, action: Callable[[], None]) -> None:
     """Let something happen right before rows of a table are exchanged the first time."""
-    commit, left = delta.exchange_alone, [True]
+    commit, left = commits.exchange_alone, [True]
 
     def meanwhile(handle: DeltaTable, name: str, *arguments: Any) -> None:
         if name == table and left.pop() is True:
@@ -180,7 +183,7 @@ def before_exchange(patched: pytest.MonkeyPatch, table: str, action: Callable[[]
             left.append(False)
         commit(handle, name, *arguments)
 
-    patched.setattr(delta, "exchange_alone", meanwhile)
+    patched.setattr(commits, "exchange_alone", meanwhile)
 
 
 def test_who_opened_a_table_before_cannot_commit_to_it_any_more(
@@ -251,10 +254,10 @@ def test_rows_that_are_nobodys_are_refused_before_anything_changes(warehouse: Wa
 def test_a_damaged_marker_does_not_bring_it_forward(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     (warehouse.folder / "kempf-warehouse.json").write_text("{")
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=3)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT, migrating=3)
     chain.migrate(warehouse, look)
     (warehouse.folder / "kempf-warehouse.json").unlink()
-    assert chain.mend_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
+    assert chain.repair_marker(warehouse) and warehouse.marker() == Marker(LAYOUT)
     assert {row["vessel_key"] for row in delta.read(warehouse, "aliases").rows(named=True)} == {
         vessel_key("aurora"),
         vessel_key("Åland"),

@@ -54,7 +54,7 @@ def test_a_flipped_bit_is_never_read_as_other_data(warehouse: Warehouse, pattern
             data[int(random.integers(len(data)))] ^= 1 << int(random.integers(8))
             path.unlink()  # another file, as the one of a copied folder is
             path.write_bytes(bytes(data))
-            table_cache.forget()  # another process: one that has read the commit before still knows it
+            table_cache._kept.clear()  # another process: one that has read the commit before still knows it
             with pytest.raises(KempfError) as caught:
                 runs.all_runs(warehouse)
             assert caught.value.code == "table_damaged" and path.name in caught.value.message
@@ -79,7 +79,7 @@ def test_a_last_commit_that_is_lost_or_emptied_is_noticed(warehouse: Warehouse, 
     with pytest.raises(KempfError):
         runs.record_all(warehouse, [runs.FlowRun("run-9", "ingest", None, "completed")])
     assert [one.where for one in damages(warehouse, "runs")] == ["runs/_delta_log/00000000000000000003.json"]
-    assert seals.mend_log(folder(warehouse), "runs") == [
+    assert seals.repair_log(folder(warehouse), "runs") == [
         "The commit runs/_delta_log/00000000000000000003.json was put back from its sealed copy."
     ]
     assert runs.all_runs(warehouse) == wanted and verify(warehouse) == []
@@ -106,7 +106,7 @@ def test_a_damaged_seal_stops_nobody_and_is_found(warehouse: Warehouse) -> None:
     assert runs.all_runs(warehouse) == wanted
     assert len(damages(warehouse, "runs")) == 2
     place = folder(warehouse)
-    done = seals.mend_log(place, "runs") + seals.mend_seals(place, "runs", sorted(place.glob("*.parquet")))
+    done = seals.repair_log(place, "runs") + seals.repair_seals(place, "runs", sorted(place.glob("*.parquet")))
     assert len(done) == 2 and seals.copy_of_commit(place, 2) == commit(warehouse, 2).read_bytes()
     with delta.reading(warehouse, "runs") as table:
         assert table is not None
@@ -122,7 +122,7 @@ def test_a_commit_that_was_cut_off_before_it_was_sealed_is_found(warehouse: Ware
         torn = commit(warehouse, 4)
         torn.write_bytes(data)
         assert [one.where for one in damages(warehouse, "runs")] == ["runs/_delta_log/00000000000000000004.json"]
-        assert len(seals.mend_log(folder(warehouse), "runs")) == 1 and not torn.exists()
+        assert len(seals.repair_log(folder(warehouse), "runs")) == 1 and not torn.exists()
         assert runs.all_runs(warehouse) == wanted
 
 
@@ -135,7 +135,7 @@ def test_compacting_keeps_all_sealed(warehouse: Warehouse) -> None:
     data[len(data) // 2] ^= 4
     checkpoint.write_bytes(bytes(data))
     assert any("checkpoint" in one.where for one in damages(warehouse, "runs"))
-    assert "the commits say the same" in seals.mend_log(folder(warehouse), "runs")[0]
+    assert "the commits say the same" in seals.repair_log(folder(warehouse), "runs")[0]
     assert runs.all_runs(warehouse) == wanted and damages(warehouse, "runs") == []
     compaction.vacuum(warehouse, 0.0)
     assert seals.sealed_versions(folder(warehouse)) and verify(warehouse) == []

@@ -48,7 +48,7 @@ def test_a_segment_comes_back_as_it_was_and_shows_itself(warehouse: Warehouse) -
     segments.replace(warehouse, {("aurora", one.ingest_id): [given]})
     stored = segments.get(warehouse, given.segment_id)
     assert as_text(stored) == as_text(given)
-    shown = stored.show("day1.nmea.gz")
+    shown = stored.as_json("day1.nmea.gz")
     assert shown["start"] == "2025-05-03T07:47:01.147000001Z"
     assert shown["log"] == "day1.nmea.gz"
     assert shown["overshoots_deg"] == [9.7, None]

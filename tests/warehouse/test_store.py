@@ -25,7 +25,7 @@ from kempf.warehouse import (
 )
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.marker import MARKER
-from kempf.warehouse.migrations.chain import mend_marker
+from kempf.warehouse.migrations.chain import repair_marker
 from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import delivery, raw_bytes
 
@@ -109,8 +109,8 @@ def test_a_marker_that_is_damaged_is_refused_and_written_anew(warehouse: Warehou
     with pytest.raises(KempfError) as caught:
         logs.current(warehouse)
     assert caught.value.code == "warehouse_marker_damaged"
-    assert mend_marker(warehouse) and marker.read_bytes() == whole
-    assert not mend_marker(warehouse)
+    assert repair_marker(warehouse) and marker.read_bytes() == whole
+    assert not repair_marker(warehouse)
 
 
 def test_a_marker_of_another_layout_is_refused_and_left(warehouse: Warehouse) -> None:
@@ -121,7 +121,7 @@ def test_a_marker_of_another_layout_is_refused_and_left(warehouse: Warehouse) ->
     with pytest.raises(KempfError) as caught:
         logs.current(warehouse)
     assert caught.value.code == "warehouse_layout"
-    assert not mend_marker(warehouse)
+    assert not repair_marker(warehouse)
 
 
 @pytest.mark.parametrize("address", ["", "  ", "/data/50%20/x", "/data/a[1]/x", "/data/a=b/x", "s3://bucket/50%"])
@@ -258,7 +258,7 @@ def test_a_table_log_that_is_no_log_is_named_without_what_the_library_adds(wareh
     assert warehouse.folder is not None
     rmtree(warehouse.folder / "runs" / "_seals")
     (warehouse.folder / "runs" / "_delta_log" / f"{1:020d}.json").write_text('{"commitInfo": {')
-    table_cache.forget()
+    table_cache._kept.clear()
     with pytest.raises(KempfError) as caught:
         runs.all_runs(warehouse)
     assert caught.value.code == "table_unreadable"

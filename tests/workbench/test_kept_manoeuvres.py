@@ -93,4 +93,4 @@ def test_taking_the_log_in_again_finds_the_same(taken: tuple[Path, Ran]) -> None
     assert log["outcome"] == "unchanged"
     assert log["segments"] == [s.segment_id for s in before if s.is_zigzag]
     assert [one["kind"] for one in log["other_manoeuvres"]] == [s.kind for s in before if not s.is_zigzag]
-    assert [s.show("") for s in segments.every(Warehouse(str(uri)))] == [s.show("") for s in before]
+    assert [s.as_json("") for s in segments.every(Warehouse(str(uri)))] == [s.as_json("") for s in before]

@@ -215,7 +215,7 @@ DYING = """
 import os, signal, sys
 from kempf.flows.jobs.migrate_warehouse import migrate
 from kempf.warehouse import delta, seals
-from kempf.warehouse.migrations import by_month, by_name
+from kempf.warehouse.migrations import by_month, by_name, commits
 from kempf.warehouse.store import Warehouse
 
 by_month.MOST_LOGS = by_name.MOST_FOLDERS = 1
@@ -231,8 +231,8 @@ def dying(write):
     return wrapped
 
 for owner, name in (
-    *((delta, name) for name in ("append_alone", "describe_alone", "exchange_alone", "replace")),
-    *((seals, "_write"), (Warehouse, "write")),
+    *((commits, name) for name in ("append_alone", "describe_alone", "exchange_alone")),
+    *((delta, "replace"), (seals, "_write"), (Warehouse, "write")),
 ):
     setattr(owner, name, dying(getattr(owner, name)))
 migrate(Warehouse(sys.argv[1]))

@@ -14,7 +14,7 @@ import yaml
 
 from kempf.warehouse import delta, parameter_sets
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.parameter_set_table import tell_set
+from kempf.workbench.parameter_set_table import print_parameter_set
 from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, one_of, refused, sets
 
@@ -47,7 +47,7 @@ def test_what_predictions_take_is_shown_beside_what_the_likelihood_says(
     filled: Path, capsys: pytest.CaptureFixture[str]
 ):
     stored = parameter_sets.get(Warehouse(str(filled)), one_of(filled, "ml"))
-    tell_set(stored, "a set", legs_too=True)
+    print_parameter_set(stored, "a set", legs_too=True)
     assert "by legs" not in capsys.readouterr().out
     ahead = {
         "parameters": {name: {"value": 1.25 + k} for k, name in enumerate(HULL)},
@@ -55,7 +55,7 @@ def test_what_predictions_take_is_shown_beside_what_the_likelihood_says(
         "better_than_one_step": {"falls_by": 0.5},
         **{"fitted_misfit": 1.0, "left_out_misfit": 4.0},  # errors are twice as wide
     }
-    tell_set(replace(stored, fit={"rung": {"one_leg_ahead": ahead}}), "a set", legs_too=True)
+    print_parameter_set(replace(stored, fit={"rung": {"one_leg_ahead": ahead}}), "a set", legs_too=True)
     shown = capsys.readouterr().out
     assert re.search(r"^a12 +\S+ +\S+ +2\.25 +4 ", shown, re.MULTILINE), shown
     assert "predictions of manoeuvres take these" in shown

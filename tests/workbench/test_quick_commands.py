@@ -8,6 +8,7 @@ from shutil import copytree
 
 import pytest
 
+from kempf.schemas.model_spec import ModelSpec
 from kempf.workbench.cli.entry import COMMANDS
 from tests.workbench.driving import one_of
 from tests.workbench.test_process import HEAVY, loaded_by
@@ -21,7 +22,7 @@ EFFECT = "yaw_quadratic"
 def modelled(_filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A warehouse whose ship stands at a model with an effect; its sets hold the numbers of another."""
     from kempf.flows.jobs.chosen_manoeuvres import choose
-    from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN, inputs_of, point
+    from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, inputs_of, point
     from kempf.warehouse import parameter_sets
     from kempf.warehouse.parameter_set import parameter_set_id
     from kempf.warehouse.store import Warehouse
@@ -31,7 +32,7 @@ def modelled(_filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     like, chosen = parameter_sets.get(warehouse, one_of(folder, "ml")), choose(warehouse, "mariner")
     rms = {"yaw_rate": 0.001, "heading": 0.01, "lateral_speed": None}
     made = []
-    for step, spec in enumerate((PLAIN, PLAIN.model_copy(update={"effects": (EFFECT,)}))):
+    for step, spec in enumerate((ModelSpec(), ModelSpec().model_copy(update={"effects": (EFFECT,)}))):
         inputs = inputs_of(chosen, spec, NONE_OF_ONES_OWN)
         rung = {
             "step": step,

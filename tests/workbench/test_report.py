@@ -20,10 +20,11 @@ import pytest
 from benchmarks.diagnose.late_rudder import LAG_S
 from kempf.flows.jobs import diagnose_vessel
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import PLAIN, Own
+from kempf.flows.jobs.standing_model import Own
 from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED
 from kempf.pipeline.diagnose.verdict import Verdict
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import delta, diagnoses
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.figures import diagnosis_confusion, diagnosis_effects, diagnosis_ladder, diagnosis_zigzag
@@ -100,7 +101,7 @@ def place(late_diagnosed: Path, tmp_path_factory: pytest.TempPathFactory) -> Ite
 def report(place: Path) -> MadeReport:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(diagnose_vessel, "examine", None)  # what is stored is not computed again
-        return make_report(Warehouse(str(place)), VESSEL, PLAIN, Own())
+        return make_report(Warehouse(str(place)), VESSEL, ModelSpec(), Own())
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +115,7 @@ def stored(place: Path, report: MadeReport) -> Mapping[str, Any]:
 def single(_filled: Path, tmp_path_factory: pytest.TempPathFactory) -> MadeReport:
     """The report of a ship with a single manoeuvre."""
     warehouse = copytree(_filled, tmp_path_factory.mktemp("single") / "warehouse")
-    return make_report(Warehouse(str(warehouse)), "mariner", PLAIN, Own())
+    return make_report(Warehouse(str(warehouse)), "mariner", ModelSpec(), Own())
 
 
 def as_verdict(verdict: str, stored: Mapping[str, Any], evidence: DiagnosisEvidence) -> tuple[Any, DiagnosisEvidence]:
@@ -200,7 +201,7 @@ def test_advice_follows_what_the_vessel_has(place: Path, late_added: Path, tmp_p
 
 def test_a_model_with_effects_is_shown_beside_the_plain_one(report: MadeReport, late_added: Path, tmp_path: Path):
     there = Warehouse(str(copytree(late_added, tmp_path / "added") / "w"))
-    with_lag = PLAIN.model_copy(update={"effects": ("rudder_lag",)})
+    with_lag = ModelSpec().model_copy(update={"effects": ("rudder_lag",)})
     made = make_report(there, VESSEL, with_lag, Own())
     evidence, wording = made.content.evidence, made.content.wording
     assert [model.added for model in evidence.models] == ["", "first-order rudder lag"]
@@ -218,7 +219,7 @@ def test_a_model_with_effects_is_shown_beside_the_plain_one(report: MadeReport, 
 def _advice(warehouse: Path) -> str:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sections, "bytes_of", lambda _: b"<svg/>")
-        return " ".join(make_report(Warehouse(str(warehouse)), VESSEL, PLAIN, Own()).content.wording.next_steps)
+        return " ".join(make_report(Warehouse(str(warehouse)), VESSEL, ModelSpec(), Own()).content.wording.next_steps)
 
 
 def test_a_diagnosis_without_curves_is_made_again_and_says_so(
@@ -229,7 +230,7 @@ def test_a_diagnosis_without_curves_is_made_again_and_says_so(
         row = delta.read(warehouse, "diagnosis_evidence").rows(named=True)[0]
         delta.replace(table, "diagnosis_evidence", [{**row, "evidence_json": "{}"}], "TRUE")
     lines: list[str] = []
-    again = make_report(warehouse, VESSEL, PLAIN, Own(), say=lines.append)
+    again = make_report(warehouse, VESSEL, ModelSpec(), Own(), say=lines.append)
     assert lines == [f"{report.diagnosis_id} was stored without the curves that a report shows; diagnosing late again"]
     assert again.html == report.html
 

@@ -20,7 +20,7 @@ def made() -> Reproduction:
 
 
 def test_the_first_approximation_leaves_the_current_at_half_its_value() -> None:
-    shown = made().experiments[0].show()["disturbances_at_the_end"]
+    shown = made().experiments[0].as_json()["disturbances_at_the_end"]
     current, force = shown["current_m_s"], shown["force_m_s2"]
     assert current["true"] == 0.3 and force["true"] == 5e-3
     assert 0.4 < current["first"] / current["true"] < 0.6
@@ -71,7 +71,7 @@ def test_the_command_prints_the_same_and_draws_three_figures(tmp_path: Path) -> 
     assert [quiet["accuracy"][n]["paper_percent"] for n in HULL] == [10.0, 10.0, 25.0, 20.0, 20.0, 5.0]
     assert len(quiet["iterations"]) == ITERATIONS + 1
     # the same bits again
-    assert quiet["accuracy"] == made().experiments[0].show()["accuracy"]
+    assert quiet["accuracy"] == made().experiments[0].as_json()["accuracy"]
     (tmp_path / "b").mkdir()
     again = draw(made(), tmp_path / "b")
     for one, other in zip(document["figures"], again, strict=True):

@@ -13,10 +13,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from kempf.schemas.errors import KempfError
-from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta, logs, purges
 from kempf.warehouse.instant import month_of
+from kempf.warehouse.migrations import commits
 from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import scanned
 from kempf.warehouse.store import Warehouse
@@ -98,21 +97,6 @@ def version_before(warehouse: Warehouse, name: str) -> int | None:
     return version_said(table, _BEFORE)
 
 
-def contents(warehouse: Warehouse, name: str, version: int | None = None) -> dict[str, tuple[int, int, int]]:
-    """Return of every ingest in a version of a table how many rows it has, and two sums of hashes of their content.
-
-    The sums do not depend on the order of the rows, nor on the month.
-    """
-    import polars as pl
-
-    columns = [column.name for column in TABLES[name].columns if column.name != "month"]
-    table = delta.open_table(warehouse, name, version)
-    row = pl.struct(columns)
-    hashed = scanned(table, name).select("ingest_id", one=row.hash(1), other=row.hash(2))
-    sums = hashed.group_by("ingest_id").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
-    return {ingest: (count, one, other) for ingest, count, one, other in sums.iter_rows()}
-
-
 def require_same(warehouse: Warehouse, name: str) -> int:
     """Return how many ingests were compared: each says the same, row by row, as before it was laid out by month.
 
@@ -124,19 +108,10 @@ def require_same(warehouse: Warehouse, name: str) -> int:
     before = version_before(warehouse, name)
     if before is None:
         return 0
-    then, now = contents(warehouse, name, before), contents(warehouse, name)
+    then, now = (commits.contents(warehouse, name, v, by="ingest_id", without="month") for v in (before, None))
     differ = sorted(ingest for ingest in then.keys() - _purged(warehouse) if now.get(ingest) != then[ingest])
     if differ:
-        first = differ[0]
-        had, has = then[first][0], now.get(first, (0, 0, 0))[0]
-        raise KempfError(
-            "migration_differs",
-            f"Of {len(then)} ingests in the table {name} {len(differ)} say something else than before, the first "
-            f"{first}: {had} rows before, {has} now.",
-            f"Nothing of before was deleted: it is version {before} of the table. Report it, and leave the warehouse "
-            "as it is.",
-            {"table": name, "version": before, "ingest_ids": differ},
-        )
+        raise commits.differs(name, before, ("ingests", "ingest_ids"), differ, then, now)
     return len(then)
 
 
@@ -201,4 +176,4 @@ def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame
 def _commit(table: DeltaTable, name: str, parts: Sequence[tuple[Held, pl.LazyFrame]], *, first: int | None) -> None:
     metadata = None if first is None else {_BEFORE: first}
     with alone(name):
-        delta.append_alone(table, name, _frames(parts), lay_out=metadata)
+        commits.append_alone(table, name, _frames(parts), lay_out=metadata)

@@ -16,6 +16,7 @@ from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES, arrow_schema
 from kempf.warehouse import delta
 from kempf.warehouse.keys import earlier_key, one_of, require_apart, vessel_key
+from kempf.warehouse.migrations import commits
 from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import by_file, scanned
 from kempf.warehouse.store import Warehouse
@@ -92,7 +93,7 @@ def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
             return  # made by this version
         before = table.version()
         with alone(name):
-            delta.describe_alone(table, name, _KEY, before)
+            commits.describe_alone(table, name, _KEY, before)
     todo = missing(warehouse, name)
     # after: of what is to be done the name is known
     names = {key: vessel for key, vessel in _whose(warehouse, name) if _is_earlier(key)}
@@ -108,7 +109,7 @@ def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
             parts = [scanned(source, name)] if whole else [p for where in each for p in by_file(source, name, where)]
             predicate = None if whole else _predicate(batch, names)
             with alone(name):
-                delta.exchange_alone(table, name, _frames(parts, names, ordered=whole), predicate, before)
+                commits.exchange_alone(table, name, _frames(parts, names, ordered=whole), predicate, before)
         done += len(batch)
         yield done
     if missing(warehouse, name):  # of one that opened the table after its words were changed
@@ -138,38 +139,13 @@ def require_same(warehouse: Warehouse, name: str) -> int:
     return compared
 
 
-def contents(warehouse: Warehouse, name: str, version: int) -> dict[str, tuple[int, int, int]]:
-    """Return of every vessel in a version of a table how many rows she has, and two sums of hashes of their content.
-
-    The sums depend neither on the order of the rows nor on the key.
-    """
-    import polars as pl
-
-    columns = [column.name for column in TABLES[name].columns if column.name != _KEY]
-    row = pl.struct(columns)
-    hashed = scanned(delta.open_table(warehouse, name, version), name).select(
-        "vessel", one=row.hash(1), other=row.hash(2)
-    )
-    sums = hashed.group_by("vessel").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
-    return {vessel: (count, one, other) for vessel, count, one, other in sums.iter_rows()}
-
-
 def _compare(warehouse: Warehouse, name: str, since: int, until: int) -> int:
     if since == until:
         return 0
-    then, now = contents(warehouse, name, since), contents(warehouse, name, until)
+    then, now = (commits.contents(warehouse, name, v, by="vessel", without=_KEY) for v in (since, until))
     differ = sorted(vessel for vessel in then.keys() | now.keys() if then.get(vessel) != now.get(vessel))
     if differ:
-        first = differ[0]
-        had, has = (sums.get(first, (0, 0, 0))[0] for sums in (then, now))
-        raise KempfError(
-            "migration_differs",
-            f"Of {len(then)} vessels in the table {name} {len(differ)} have other rows than before, the first "
-            f"{first!r}: {had} rows before, {has} now.",
-            f"Nothing of before was deleted: it is version {since} of the table. Report it, and leave the warehouse "
-            "as it is.",
-            {"table": name, "version": since, "vessels": differ},
-        )
+        raise commits.differs(name, since, ("vessels", "vessels"), differ, then, now)
     return len(then)
 
 

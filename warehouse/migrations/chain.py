@@ -105,11 +105,11 @@ def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
             f"The warehouse {warehouse.uri} cannot be brought forward: {len(problems)} problems, the first: "
             f"{problems[0].words}",
             "Repair it with the version of kempf that wrote it: `kempf repair`; nothing was changed.",
-            {"problems": [problem.show() for problem in problems]},
+            {"problems": [problem.as_json() for problem in problems]},
         )
 
 
-def mend_marker(warehouse: Warehouse) -> bool:
+def repair_marker(warehouse: Warehouse) -> bool:
     """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
 
     A warehouse of another layout stays as it is. The tables tell which layout they have; where they have an earlier

@@ -44,7 +44,7 @@ def command(more_files_than: int, vacuum: bool, days: float, dry_run: bool, uri:
     tables = () if dry_run else compaction.compact(warehouse, more_files_than)
     cleared = compaction.vacuum(warehouse, 24.0 * days, dry_run=dry_run) if vacuum or dry_run else ()
     if as_json:
-        print_json({"compacted": list(tables), "vacuumed": [table.show() for table in cleared], "dry_run": dry_run})
+        print_json({"compacted": list(tables), "vacuumed": [table.as_json() for table in cleared], "dry_run": dry_run})
         return
     if not dry_run:
         click.echo(f"compacted: {', '.join(tables) or 'nothing, no table has so many files'}")

@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import ThresholdExceeded, UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
+from kempf.workbench.numbers import number
 from kempf.workbench.ranked_warnings import MOST
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar, short_ids
+from kempf.workbench.terminal import print_json, print_note, print_table, progress_bar, short_ids
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -24,8 +26,8 @@ if TYPE_CHECKING:
 _CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
 #: probability below which a band or a correlation is shown
 _LEVEL = 0.01
-#: fit, %, below which a run has left the measured course
-_RUN_OFF = -100.0
+#: fit, %, below which the number of a fit says nothing: the error is twice the motion
+_WORST_FIT = -100.0
 _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 
@@ -87,7 +89,7 @@ def command(
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
     for comparison, path in zip_longest(compared, figures):
-        document = comparison.show()
+        document = comparison.as_json()
         if with_where:
             document["where"] = comparison.where()
         if path is not None:
@@ -177,7 +179,7 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     for run in runs if verbose else ():
         every = " ".join(_signed(error) for error in run["overshoot_error_deg"])
         click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
-    off = sum(any(_off(fit) for fit in run["fit_percent"].values()) for run in runs)
+    off = sum(any(_is_off(fit) for fit in run["fit_percent"].values()) for run in runs)
     click.echo(f"  {_fits_together(runs, mean['fit_percent'], there, off)}")
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
@@ -201,12 +203,13 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
 
 
 def _fits_together(runs: list[dict[str, Any]], mean: dict[str, Any], there: list[str], off: int) -> str:
-    """Return the fit over all runs, the mean; the median where runs have run off, so many."""
+    """Return the fit over all runs: the mean, or the median where so many runs are off."""
     if off:
         known = {name: [run["fit_percent"][name] for run in runs if name in run["fit_percent"]] for name in there}
         middle = {name: median(fits) for name, fits in known.items()}
         parts = [f"{_CHANNELS[name]} {_percent(fit)} %" for name, fit in middle.items()]
-        return f"median fit: {', '.join(parts)}; {off} of {len(runs)} run off, so that a mean says nothing"
+        many = f"{off} of {len(runs)} have a fit below {_WORST_FIT:g} %"
+        return f"median fit: {', '.join(parts)}; {many}, so that a mean says nothing"
     fits = [mean[name] for name in there]
     parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
     quoted_as = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
@@ -220,7 +223,7 @@ def _print_where(title: str, where: dict[str, Any]) -> None:
     rows = [
         [
             _CHANNELS[group["channel"]],
-            f"{group['of'].removeprefix('by_').replace('_', ' ')}: {group['which'].replace('_', ' ')}",
+            f"{as_words(group['of'].removeprefix('by_'))}: {as_words(group['which'])}",
             f"{group['n']}",
             f"{group['whitened_rms']:.2f}",
             f"{group['band'][0]:.2f} to {group['band'][1]:.2f}",
@@ -258,7 +261,7 @@ def _print_correlation(channel: str, correlations: dict[str, Any]) -> None:
     if significant:
         name, entry = min(significant, key=lambda pair: float(pair[1]["p_adjusted"]))
         click.echo(
-            f"  {channel}: errors are correlated with {name.replace('_', ' ')} {entry['largest_lag_s']:g} s before: "
+            f"  {channel}: errors are correlated with {as_words(name)} {entry['largest_lag_s']:g} s before: "
             f"{entry['largest']:+.2f} (99 % band ±{entry['band']:.2f})"
         )
 
@@ -269,13 +272,13 @@ def _size(window: dict[str, Any]) -> str:
     return f"rms {number(window['free_run_rms'], 3)} {window['unit']}, {window['times_its_rms']:.1f} x"
 
 
-def _off(fit: float | None) -> bool:
-    """Return whether a run has left what was measured: its error is twice the motion."""
-    return fit is not None and fit < _RUN_OFF
+def _is_off(fit: float) -> bool:
+    """Return whether a fit is so bad that its number says nothing."""
+    return fit < _WORST_FIT
 
 
 def _percent(value: float | None) -> str:
-    return "-" if value is None else "ran off" if _off(value) else f"{value:.2f}"
+    return "-" if value is None else f"< {_WORST_FIT:g}" if _is_off(value) else f"{value:.2f}"
 
 
 def _error(errors: dict[str, Any], *, middle: bool = False) -> str:

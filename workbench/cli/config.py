@@ -22,7 +22,7 @@ def command(as_json: bool) -> None:
 
     settings = every()
     if as_json:
-        print_json([setting.show() for setting in settings])
+        print_json([setting.as_json() for setting in settings])
         return
     rows = [
         [setting.name, setting.value or "-", setting.source or "-", VARIABLES[setting.name]] for setting in settings

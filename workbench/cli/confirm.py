@@ -12,7 +12,7 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.terminal import counted
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.following import Following
+    from kempf.flows.jobs.affected_sets import Affected
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -49,7 +49,7 @@ def confirm(what: str, *, yes: bool) -> None:
     click.confirm(f"{what}. Go on?", abort=True, err=True)
 
 
-def what_goes(following: Following | None, of: str) -> str:
+def what_goes(affected: Affected | None, of: str) -> str:
     """Say what follows where logs count no longer, a sentence without its full stop.
 
     Parameters
@@ -57,11 +57,11 @@ def what_goes(following: Following | None, of: str) -> str:
     of : str
         What is done, such as "day.csv is removed".
     """
-    if following is None:
+    if affected is None:
         return f"{of}; she has no log"
-    sets = f"{counted(len(following.set_ids), 'parameter set')} superseded"
-    current = ", her current one among them" if following.current else ""
+    sets = f"{counted(len(affected.set_ids), 'parameter set')} superseded"
+    current = ", her current one among them" if affected.current else ""
     return (
-        f"{of}: {counted(len(following.logs), 'log')} and {counted(len(following.segment_ids), 'manoeuvre')} of "
-        f"{following.vessel!r} count no longer, {sets}{current}"
+        f"{of}: {counted(len(affected.logs), 'log')} and {counted(len(affected.segment_ids), 'manoeuvre')} of "
+        f"{affected.vessel!r} count no longer, {sets}{current}"
     )

@@ -100,7 +100,7 @@ def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_jso
 @json_option
 def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     """List every correction that was made, with its reason and when."""
-    from kempf.warehouse import corrections, logs, said, vessels
+    from kempf.warehouse import append_only, corrections, logs, vessels
     from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
 
@@ -109,7 +109,7 @@ def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     if vessel is not None:
         vessels.require(warehouse, vessel)
     rows = {row.log_id: row for row in logs.current(warehouse, vessel)}
-    when = said.times(warehouse, "corrections")
+    when = append_only.times(warehouse, "corrections")
     listed: list[dict[str, Any]] = []
     for entry in corrections.all_of(warehouse, rows if vessel is not None else None):
         row, bounds = rows.get(entry.log_id), entry.correction.bounds_utc_ns
@@ -154,7 +154,7 @@ def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bo
     confirm(_words(planned), yes=yes)
     planned.store(warehouse)
     if as_json:
-        print_json(planned.show())
+        print_json(planned.as_json())
         return
     click.echo(f"{_words(planned)}.")
     click.echo(f"next: {command_for([planned.log.vessel])}")
@@ -166,9 +166,9 @@ def _words(planned: Planned) -> str:
     sentence = f"{_described(planned.before or planned.after)} {outcomes[planned.correction.action]}"
     if planned.before is not None and planned.after.segment_id != planned.before.segment_id:
         sentence += f" and is {_described(planned.after)}"
-    following = planned.following
-    current = ", the current one among them" if following.current else ""
-    superseded = f"{counted(len(following.set_ids), 'parameter set')} of {following.vessel!r} superseded{current}"
+    affected = planned.affected
+    current = ", the current one among them" if affected.current else ""
+    superseded = f"{counted(len(affected.set_ids), 'parameter set')} of {affected.vessel!r} superseded{current}"
     return "\n".join((f"{sentence}: {superseded}", *(f"  warning: {doubt}" for doubt in planned.doubts)))
 
 

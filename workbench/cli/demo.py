@@ -9,7 +9,8 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import folder_option, json_option
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.demonstrate import Demonstration
@@ -35,9 +36,9 @@ def command(folder: Path, as_json: bool) -> None:
                 "folder": str(shown.folder),
                 "vessel": shown.vessel,
                 "truth": shown.truth,
-                "ingested": [o.show() for o in shown.ingested],
-                "parameter_sets": [o.parameter_set.show() for o in shown.identified if o.parameter_set],
-                "reruns": [r.show() for r in shown.reruns],
+                "ingested": [o.as_json() for o in shown.ingested],
+                "parameter_sets": [o.parameter_set.as_json() for o in shown.identified if o.parameter_set],
+                "reruns": [r.as_json() for r in shown.reruns],
             }
         )
         return
@@ -45,10 +46,10 @@ def command(folder: Path, as_json: bool) -> None:
 
 
 def _print_demonstration(shown: Demonstration) -> None:
-    from kempf.workbench.cli.ingest import tell_outcomes
+    from kempf.workbench.cli.ingest import print_outcomes
 
     click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")
-    tell_outcomes(shown.ingested, notes=False)
+    print_outcomes(shown.ingested, notes=False)
     click.echo()
     zigzags = [
         [

@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.effect_verdicts import effect_verdict
+from kempf.workbench.numbers import number, percent
 from kempf.workbench.rungs import compared, first_model
-from kempf.workbench.terminal import counted, number, print_json, print_table, progress_bar
+from kempf.workbench.terminal import counted, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse
@@ -64,9 +66,9 @@ def command(
     with progress_bar() as progress:
         diagnosis, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=progress)
     if as_json:
-        print_json(diagnosis.show())
+        print_json(diagnosis.as_json())
         return
-    document = diagnosis.show()
+    document = diagnosis.as_json()
     _print_diagnosis(document, everything=everything)
     _print_at_hand(warehouse, document)
     if document["sets"]:
@@ -98,11 +100,11 @@ def _fleet(uri: str, *, as_json: bool) -> None:
     table = [
         [
             row["vessel"],
-            row["verdict"].replace("_", " "),
+            as_words(row["verdict"]),
             row["effects"] or "-",
             row["since"][:19] or "-",
-            _percent(row["held_out_before"]),
-            _percent(row["held_out_after"]),
+            percent(row["held_out_before"]),
+            percent(row["held_out_after"]),
             row["note"],
         ]
         for row in rows
@@ -111,12 +113,8 @@ def _fleet(uri: str, *, as_json: bool) -> None:
     print_table(head, table, "What the models of the fleet lack")
 
 
-def _percent(share: float | None) -> str:
-    return "-" if share is None else number(100 * share, 3)
-
-
 def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
-    title = f"{document['vessel']}: {document['verdict'].replace('_', ' ')}"
+    title = f"{document['vessel']}: {as_words(document['verdict'])}"
     click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
     for sentence in document["sentences"]:
         click.echo(f"  {sentence}")

@@ -9,7 +9,8 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, profile_option, warehouse_option
-from kempf.workbench.terminal import number, one_line, print_json, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import one_line, print_json, print_table
 
 
 @click.command("doctor", cls=GivenOnce)

@@ -14,9 +14,10 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.documents.tried import refits
+from kempf.workbench.numbers import number
 from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.rungs import by_manoeuvre, compared, in_words
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
+from kempf.workbench.terminal import print_json, print_note, print_table, progress_bar
 
 
 @click.command("try", cls=GivenOnce)
@@ -116,7 +117,7 @@ def add(
     rungs = rungs_to(warehouse, parameter_set)
     if as_json:
         print_json(
-            {"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": parameter_set.show()}
+            {"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": parameter_set.as_json()}
         )
         return
     print_rungs(rungs[-2:], vessel)
@@ -180,6 +181,6 @@ def undo(vessel: str, uri: str, as_json: bool) -> None:
 
     now = go_back(Warehouse(uri), vessel)
     if as_json:
-        print_json(now.show())
+        print_json(now.as_json())
     else:
         click.echo(f"{vessel}: the current model is {now.model_name} again, {now.parameter_set_id}")

@@ -165,7 +165,7 @@ def _print_error(error: KempfError, as_json: bool) -> int:
     if error.code == "internal":
         traceback.print_exception(error)
     if as_json:
-        click.echo(json.dumps(error.to_json(), indent=2, default=str))
+        click.echo(json.dumps(error.as_json(), indent=2, default=str))
     else:
         named = f"{click.style('error', fg='red', bold=True)} [{error.code}]"
         click.echo(

@@ -7,7 +7,8 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.instants import utc_ns_of
-from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 
 @click.command("explain", cls=GivenOnce)
@@ -31,7 +32,7 @@ def command(
 
     begin, over = utc_ns_of(start, "--from"), utc_ns_of(end, "--to")
     with progress_bar() as progress:
-        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress, segment_id).show()
+        document = explain_stretch(Warehouse(uri), vessel, begin, over, set_id, progress, segment_id).as_json()
     if as_json:
         print_json(document)
         return

@@ -150,7 +150,7 @@ def mcap_file(
     print_note(said_of_vessel(warehouse, vessel))
     comparison = _only(comparison, segments) if segments else comparison
     data = to_mcap(comparison.runs, about(comparison), measured_positions(warehouse, comparison.found))
-    write_new(output, data, "--output")
+    write_new(output, data)
     name = comparison.parameter_set.parameter_set_id
     if as_json:
         content = {
@@ -212,7 +212,7 @@ def _deliver(form: str, name: str, content: str | bytes, output: Path | None, as
     from kempf.workbench.new_file import write_new
 
     if output is not None:
-        write_new(output, content, "--output")
+        write_new(output, content)
     text = content if isinstance(content, str) and output is None else None
     if as_json:
         print_json({"parameter_set_id": name, "format": form, "out": str(output) if output else None, "text": text})

@@ -14,7 +14,8 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, output_option, vessel_option, warehouse_option
 from kempf.workbench.instants import end_of
 from kempf.workbench.new_file import require_figures, require_new, writing
-from kempf.workbench.terminal import counted, number, print_json, print_note, print_paragraph, print_table, short_ids
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import counted, print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -189,12 +190,12 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
 def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> None:
     """Say of the current sets that are listed where predictions take other parameters than these."""
     from kempf.warehouse import aliases, parameter_sets
-    from kempf.workbench.parameter_set_table import tell_by_likelihood
+    from kempf.workbench.parameter_set_table import print_by_likelihood
 
     for name, vessel_history in histories.items():
         current = aliases.of_vessel(warehouse, name).get(aliases.CURRENT)
         if current is not None and current in vessel_history.frame["parameter_set_id"].unique().to_list():
-            tell_by_likelihood(parameter_sets.get(warehouse, current, name))
+            print_by_likelihood(parameter_sets.get(warehouse, current, name))
 
 
 def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:
@@ -211,14 +212,14 @@ def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | No
 def _drawn(examined: Examined, figure: Path | None, vessel: str) -> dict[str, Any]:
     """Return what the tests say of one model and estimator, drawn where a figure is asked for."""
     if figure is None or not len(examined.history):
-        return examined.show()
+        return examined.as_json()
     from kempf.workbench.figures.history import draw_history
 
     kind = examined.kind
     title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {examined.changes.verdict}"
     with writing(figure):
         draw_history(examined.history, examined.changes, figure, title)
-    return examined.show(str(figure))
+    return examined.as_json(str(figure))
 
 
 #: Why a set is left out, of those that no history of single manoeuvres could take.

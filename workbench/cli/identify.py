@@ -13,7 +13,7 @@ from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
-from kempf.workbench.parameter_set_table import tell_set
+from kempf.workbench.parameter_set_table import print_parameter_set
 from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import counted, print_json, progress_bar
 
@@ -62,13 +62,13 @@ def command(
         outcomes = identify_vessel(warehouse, vessel, request, progress=progress)
         pooled, alone = _pooled(warehouse, vessel, request, outcomes, progress)
     if as_json:
-        print_json([*(_show(outcome, alone) for outcome in outcomes), *([pooled.show()] if pooled else [])])
+        print_json([*(_show(outcome, alone) for outcome in outcomes), *([pooled.as_json()] if pooled else [])])
     else:
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
             title = f"{counted(len(pooled.segment_ids) - held, 'manoeuvre')} pooled"
             title += f", {held} held out: {pooled.parameter_set_id}" if held else f": {pooled.parameter_set_id}"
-            tell_set(pooled, title, verbose=verbose)
+            print_parameter_set(pooled, title, verbose=verbose)
             _print_alone(alone, verbose=verbose)
         for outcome in outcomes:
             _print_outcome(outcome, verbose=verbose)
@@ -128,9 +128,9 @@ def _show(outcome: IdentifyOutcome, alone: dict[str, str]) -> object:
     name = outcome.segment.segment_id
     why = {"not_pooled": alone[name]} if name in alone else {}
     if outcome.parameter_set is not None:
-        return {**outcome.parameter_set.show(), **why}
+        return {**outcome.parameter_set.as_json(), **why}
     assert outcome.error is not None
-    return {"segment_id": name, **outcome.error.to_json(), **why}
+    return {"segment_id": name, **outcome.error.as_json(), **why}
 
 
 def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:
@@ -140,4 +140,4 @@ def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:
         assert outcome.error is not None
         click.echo(f"{named}: not identified [{outcome.error.code}] {outcome.error}", err=True)
         return
-    tell_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}", verbose=verbose)
+    print_parameter_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}", verbose=verbose)

@@ -41,7 +41,7 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     from kempf.schemas.errors import UsageError
     from kempf.warehouse.source_folder import SourceFolder
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.cli.ingest import tell_outcomes
+    from kempf.workbench.cli.ingest import print_outcomes
 
     place = folder or setting("inbox")
     if place is None:
@@ -53,9 +53,9 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     with progress_bar() as progress:
         run = take_inbox(Warehouse(uri), SourceFolder(place), progress, new_vessels=new_vessel, settle_s=settle_s)
     if as_json:
-        print_json(run.show())
+        print_json(run.as_json())
     else:
-        tell_outcomes(run.ingested, verbose=verbose)
+        print_outcomes(run.ingested, verbose=verbose)
         _print_run(run)
     if run.quarantined:
         raise click.exceptions.Exit(NeedsAPerson.exit_code)

@@ -60,16 +60,16 @@ def command(
     if len(outcomes) == 1 and failed:
         raise failed[0]
     if as_json:
-        print_json([outcome.show() for outcome in outcomes])
+        print_json([outcome.as_json() for outcome in outcomes])
     else:
-        tell_outcomes(outcomes, verbose=verbose)
+        print_outcomes(outcomes, verbose=verbose)
         if any(outcome.segments for outcome in outcomes):
             click.echo("next: kempf segments, kempf identify --vessel NAME")
     if failed:
         sys.exit(max(error.exit_code for error in failed))
 
 
-def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, notes: bool = True) -> None:
+def print_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, notes: bool = True) -> None:
     """Print what became of some logs, then what is to be said of their channels and of how they were read."""
     for outcome in outcomes:
         _print_outcome(outcome)

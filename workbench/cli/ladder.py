@@ -9,8 +9,9 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.numbers import number
 from kempf.workbench.rungs import Rung, compared, in_words, remarks
-from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
+from kempf.workbench.terminal import print_json, print_note, print_table, short_ids
 
 #: columns of the error one leg ahead, and of that of free runs
 LEG = ("leg: fitted", "left out", "held out")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import (
@@ -117,7 +118,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     for name, value in shown.items():
         listed = value if isinstance(value, list) else [value]
         for entry in listed:
-            click.echo(f"{name.replace('_', ' ')}: {one_line(str(entry))}")
+            click.echo(f"{as_words(name)}: {one_line(str(entry))}")
     if channels is None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:
@@ -202,14 +203,14 @@ def release_file(
     from kempf.flows.jobs.files import read_profiles
     from kempf.flows.jobs.release_log import release
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.cli.ingest import tell_outcomes
+    from kempf.workbench.cli.ingest import print_outcomes
 
     profile = read_profiles(profiles) if profiles else None
     outcome = release(Warehouse(uri), file, vessel, profile, new_vessel=new_vessel)
     if as_json:
-        print_json(outcome.show())
+        print_json(outcome.as_json())
     else:
-        tell_outcomes([outcome], verbose=verbose)
+        print_outcomes([outcome], verbose=verbose)
 
 
 @command.command("dismiss")
@@ -237,7 +238,7 @@ def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
 @json_option
 def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a log count no longer. Nothing is deleted: `restore` brings it back, `history --as-of` still knows it."""
-    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.affected_sets import of_logs
     from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import remove
     from kempf.warehouse import logs
@@ -246,9 +247,9 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
     confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
-    following = remove(warehouse, [row], reason)
+    affected = remove(warehouse, [row], reason)
     if as_json:
-        print_json(following.show())
+        print_json(affected.as_json())
     else:
         click.echo(f"{one_line(row.file_name)}: removed; next: {command_for([row.vessel])}")
 
@@ -281,7 +282,7 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a log to the vessel that it is of: it is read again from its bytes, with her profile."""
-    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.affected_sets import of_logs
     from kempf.flows.jobs.remove_logs import move
     from kempf.schemas.errors import NotFound
     from kempf.warehouse import logs
@@ -295,10 +296,10 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
         pass
     else:
         confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
-    following, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
+    affected, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
     if as_json:
-        print_json({**facts_of(now), "following": following.show() if following else None})
+        print_json({**facts_of(now), "following": affected.as_json() if affected else None})
         return
-    of = [vessel] if following is None else [following.vessel, vessel]
+    of = [vessel] if affected is None else [affected.vessel, vessel]
     again = " ".join(f"--vessel {name}" for name in of)
     click.echo(f"{one_line(now.file_name)}: a log of {vessel} now; next: kempf reprocess {again}")

@@ -5,28 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from kempf.workbench.terminal import number
+from kempf.workbench.manoeuvre_figures import FIGURES
+from kempf.workbench.numbers import number
 
 if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment
-
-#: Names of the figures in words, in the order in which they are said.
-_WORDS = {
-    "advance_m": "advance",
-    "transfer_m": "transfer",
-    "tactical_diameter_m": "tactical diameter",
-    "steady_diameter_m": "steady diameter",
-    "steady_yaw_rate_deg_s": "steady yaw rate",
-    "steady_drift_deg": "steady drift angle",
-    "speed_loss_percent": "speed loss",
-    "initial_yaw_rate_deg_s": "yaw rate of the turn",
-    "residual_yaw_rate_deg_s": "residual yaw rate",
-    "loop_width_deg": "width of the loop",
-    "loop_height_deg_s": "height of the loop",
-}
-
-#: Units by the end of a name.
-_UNITS = {"_deg_s": "deg/s", "_percent": "%", "_deg": "deg", "_m": "m"}
 
 _DIGITS = 3
 
@@ -56,7 +39,7 @@ def figures(segment: Segment) -> list[str]:
     """Return its figures, one sentence each, and what is to be known before trusting them."""
     length = segment.detail.get("length_m")
     known = segment.detail.get("figures", {})
-    lines = [_figure(_WORDS[name], name, known[name], length) for name in _WORDS if name in known]
+    lines = [_figure(*FIGURES[name], known[name], length) for name in FIGURES if name in known]
     for point in segment.detail.get("points", ()):
         rate = point["yaw_rate_deg_s"]
         steady = "" if point["steady"] else ", not steady yet"
@@ -65,10 +48,9 @@ def figures(segment: Segment) -> list[str]:
     return [*lines, *criteria.values(), *segment.quality["reasons"]]
 
 
-def _figure(words: str, name: str, figure: Mapping[str, Any], length_m: float | None) -> str:
+def _figure(words: str, unit: str, figure: Mapping[str, Any], length_m: float | None) -> str:
     if figure["value"] is None:
         return f"{words}: not known, {figure['why']}"
-    unit = next(unit for end, unit in _UNITS.items() if name.endswith(end))
     lengths = f", {figure['value'] / length_m:.2f} L" if unit == "m" and length_m else ""
     why = f", {figure['why']}" if figure["low"] is None and figure["why"] else ""
     return f"{words}: {_with_interval(figure)} {unit}{lengths}{why}"

@@ -33,7 +33,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     with progress_bar() as progress:
         migration = migrate(warehouse, progress)
     if as_json:
-        print_json(migration.show())
+        print_json(migration.as_json())
     elif migration.since == migration.until:
         click.echo(f"nothing to do: the warehouse has layout {migration.until}")
     else:

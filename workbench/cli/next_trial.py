@@ -6,7 +6,8 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 
 @click.command("next-trial", cls=GivenOnce)
@@ -25,7 +26,7 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     from kempf.warehouse.store import Warehouse
 
     with progress_bar() as progress:
-        document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).show()
+        document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).as_json()
     if as_json:
         print_json(document)
         return

@@ -58,7 +58,7 @@ def command(
             vessels.require(warehouse, vessel)
         listed = notes.of_vessel(warehouse, vessel)
         if as_json:
-            print_json([entry.show() for entry in listed])
+            print_json([entry.as_json() for entry in listed])
         elif not listed:
             click.echo("no notes")
         for entry in [] if as_json else listed:
@@ -68,7 +68,7 @@ def command(
     event = utc_ns_of(at, "--at") if at is not None else None
     note = notes.add(warehouse, whose, subject, subject_id, text, event_utc_ns=event, draught_m=draught_m)
     if as_json:
-        print_json(note.show())
+        print_json(note.as_json())
     else:
         click.echo(words_of(note))
 

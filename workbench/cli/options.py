@@ -8,16 +8,9 @@ from typing import Any, TypeVar
 
 import click
 
+from kempf.flows.process.configuration import configured_warehouse
+
 F = TypeVar("F", bound=Callable[..., Any])
-
-DEFAULT_WAREHOUSE = "kempf-data"
-
-
-def configured_warehouse() -> str:
-    """Return the address of the warehouse that is set, else the default one; raises what `setting` raises."""
-    from kempf.flows.process.configuration import setting
-
-    return setting("warehouse") or DEFAULT_WAREHOUSE
 
 
 def warehouse_option(function: F) -> F:

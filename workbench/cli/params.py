@@ -18,10 +18,10 @@ from kempf.workbench.cli.options import (
     vessel_option,
     warehouse_option,
 )
-from kempf.workbench.terminal import number, print_json, print_note, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_note, print_table
 
 if TYPE_CHECKING:
-    from kempf.pipeline.estimate.result import Value
     from kempf.pipeline.steering.nomoto import Constant
 
 
@@ -65,19 +65,19 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     from kempf.flows.jobs.leg_fit import by_name
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.parameter_set_table import tell_set
+    from kempf.workbench.parameter_set_table import print_parameter_set
 
     warehouse = Warehouse(uri)
     parameter_set = named_set(warehouse, set_id, vessel)
     print_note(said_of_sets(warehouse, [parameter_set]))
     if as_json:
-        print_json(parameter_set.show())
+        print_json(parameter_set.as_json())
         return
     title = (
         f"{parameter_set.parameter_set_id}: {parameter_set.vessel}, model {parameter_set.model_name}, "
         f"estimator {parameter_set.estimator}"
     )
-    tell_set(parameter_set, title, verbose=verbose, legs_too=True)
+    print_parameter_set(parameter_set, title, verbose=verbose, legs_too=True)
     print_table(
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in parameter_set.discrete],
@@ -109,7 +109,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
-    from kempf.workbench.parameter_set_table import tell_by_likelihood
+    from kempf.workbench.parameter_set_table import print_by_likelihood
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
@@ -124,7 +124,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
         words = "Without their dimension, as ships of other sizes are compared; K' and T' of the hull alone:"
         print_table(head, _difference_rows(document["nondimensional"]), words)
     for each in (one, other):
-        tell_by_likelihood(each)
+        print_by_likelihood(each)
 
 
 def _difference_rows(differences: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
@@ -158,7 +158,7 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
     if output is None:
         click.echo(text, nl=False)
     else:
-        write_new(output, text, "--output")
+        write_new(output, text)
 
 
 @command.command("alias")
@@ -208,63 +208,29 @@ def steering(
     Of a set with effects these are the constants of its linear model about a straight course; what has no part in it is
     named, and so is a lag of the rudder, which is none of the hull's.
     """
-    from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.flows.jobs.ship_model import ship_of_set
-    from kempf.pipeline.steering.motion import linear_hull
-    from kempf.pipeline.steering.nomoto import nomoto
-    from kempf.pipeline.steering.stability import stability
+    from kempf.flows.jobs.steering_of_set import steering_of_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.ranked_warnings import show_warnings
 
     warehouse = Warehouse(uri)
-    ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed)
+    found = steering_of_set(warehouse, set_id, vessel, speed)
+    ship, judged = found.ship, found.stability
     print_note(said_of_sets(warehouse, [ship.parameter_set]))
-    linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)
-    constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)
-    judged = stability(linear.hull, linear.covariance, ship.speed_m_s)
-    effects = ship.effect_parameters
-    warnings = [*ship.of_parameters, *constants.warnings, *ship.remarks]
-    if linear.settled:
-        warnings.append("the states of effects are settled in K, T1, T2, T3 and T: they hold for slow motion")
-    if not ship.parameter_set.convergence.get("converged"):
-        warnings.insert(0, "the search for these parameters did not converge")
-    name = ship.parameter_set.parameter_set_id
     if as_json:
-        print_json(
-            {
-                "parameter_set_id": name,
-                "vessel": ship.parameter_set.vessel,
-                "speed_m_s": ship.speed_m_s,
-                "length_m": ship.length_m,
-                "nomoto": {
-                    "poles": constants.poles,
-                    "constants": {n: _as_json(c) for n, c in constants.constants.items()},
-                },
-                "stability": {
-                    "verdict": judged.verdict,
-                    "reason": judged.reason,
-                    "probability_stable": judged.probability,
-                    "determinant": _as_json(judged.determinant),
-                    "eigenvalues_real_part": [_as_json(v) for v in judged.real_parts],
-                },
-                "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in effects},
-                "warnings": warnings,
-            }
-        )
+        print_json(found.as_json())
         return
-    rows = [[c.name, number(c.value), number(c.std, 2), c.unit, _interval(c)] for c in constants.constants.values()]
-    rows += [[p.name, number(p.value), number(p.std, 2), p.unit, "-"] for p in effects]
-    print_table(["", "value", "1 s.e.", "unit", "95 % interval"], rows, f"{name} at {number(ship.speed_m_s)} m/s")
+    rows = [[c.name, number(c.value), number(c.std, 2), c.unit, _interval(c)] for c in found.nomoto.constants.values()]
+    rows += [[p.name, number(p.value), number(p.std, 2), p.unit, "-"] for p in ship.effect_parameters]
+    print_table(
+        ["", "value", "1 s.e.", "unit", "95 % interval"],
+        rows,
+        f"{ship.parameter_set.parameter_set_id} at {number(ship.speed_m_s)} m/s",
+    )
     click.echo(f"  on a straight course: {judged.verdict}; {judged.reason}")
     for part in judged.real_parts:
         click.echo(f"  {part.name}: real part {number(part.value)} ± {number(part.std, 2)} {part.unit} (1 s.e.)")
-    show_warnings(warnings, verbose=verbose)
-
-
-def _as_json(value: Constant | Value) -> dict[str, object]:
-    interval = {"interval_95": value.interval_95} if hasattr(value, "interval_95") else {}
-    return {"value": value.value, "std": value.std, "unit": value.unit, **interval}
+    show_warnings(found.warnings, verbose=verbose)
 
 
 def _interval(constant: Constant) -> str:

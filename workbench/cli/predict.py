@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from kempf.flows.jobs.predict_request import Kind, PredictRequest, Side, angles_of
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words, scaled
 from kempf.workbench.new_file import require_figures, writing
-from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
     from kempf.flows.jobs.predicted import Predicted
     from kempf.pipeline.manoeuvre.prediction import Figure
 
-_KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
-
 
 @click.command("predict", cls=GivenOnce)
-@click.argument("manoeuvre", type=click.Choice(_KINDS))
+@click.argument("manoeuvre", type=click.Choice(get_args(Kind)))
 @vessel_option(required=True)
 @click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
 @click.option(
@@ -36,9 +36,7 @@ _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
     help="Rudder of circle, pull-out or spiral; default: 35, 20 and 20.",
 )
 @click.option("--angles", metavar="HEADING/RUDDER", help="Of a zigzag, degrees; default: 20/20.")
-@click.option(
-    "--side", type=click.Choice(["starboard", "port"]), default="starboard", show_default=True, help="Of the turn."
-)
+@click.option("--side", type=click.Choice(get_args(Side)), default="starboard", show_default=True, help="Of the turn.")
 @click.option(
     "--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed."
 )
@@ -74,13 +72,12 @@ def command(
     """
     from kempf.flows.jobs.checked_prediction import predict_checked
     from kempf.flows.jobs.compare_predicted import measured_beside, measured_kind, other_orders
-    from kempf.flows.jobs.predict_request import PredictRequest
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.prediction import prediction_document
 
     require_figures(figure, code="cannot_write")
     _require_fitting(manoeuvre, rudder_deg, angles)
-    heading, rudder = _angles(angles) if angles is not None else (20.0, 20.0)
+    heading, rudder = angles_of(angles, "--angles") if angles is not None else (20.0, 20.0)
     request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed, rudder_rate)
     with progress_bar() as progress:
         predicted = predict_checked(Warehouse(uri), vessel, request, progress)
@@ -113,17 +110,8 @@ def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | Non
         raise UsageError("usage", f"A {manoeuvre} has no --angles.", "Give its rudder with --rudder.")
 
 
-def _angles(text: str) -> tuple[float, float]:
-    match = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)\s*", text)
-    if match is None:
-        raise UsageError(
-            "angles_unreadable", f"--angles {text!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
-        )
-    return float(match[1]), float(match[2])
-
-
 def _title(predicted: Predicted) -> str:
-    manoeuvre = predicted.show()["manoeuvre"]
+    manoeuvre = predicted.as_json()["manoeuvre"]
     kind = manoeuvre["kind"].replace("-", " ")
     words = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
     if kind == "zigzag":
@@ -136,7 +124,7 @@ def _title(predicted: Predicted) -> str:
 
 
 def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
-    shown = predicted.show()
+    shown = predicted.as_json()
     manoeuvre = shown["manoeuvre"]
     scale = predicted.basis.particulars.model_scale
     rows = [_row(name, figure, manoeuvre, scale) for name, figure in predicted.prediction.figures.items()]
@@ -208,7 +196,7 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre], kind: str) -> None:
             words = beside_in_words(kind, base, int(place) if place else None, vars(run))
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
-                about = (run.segment_id[:12], run.side, run.sample.replace("_", " "), words)
+                about = (run.segment_id[:12], run.side, as_words(run.sample), words)
                 verdict = "yes" if beside.inside else "by both" if beside.agrees else "no"
                 rows.append([*about, _with_half(beside), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]

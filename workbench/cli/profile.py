@@ -30,7 +30,7 @@ def draft(log: Path, output: Path | None, as_json: bool) -> None:
 
     text = drafted(log)
     if output is not None:
-        write_new(output, text, "--output")
+        write_new(output, text)
     if as_json:
         print_json({"log": str(log), "output": str(output) if output else None, "profile": text})
     elif output is None:

@@ -36,6 +36,6 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     confirm(shown, yes=yes)
     receipt = purge(warehouse, goes.log_id, reason)
     if as_json:
-        print_json(receipt.show())
+        print_json(receipt.as_json())
     else:
         click.echo(f"{shown}. Log {receipt.log_id}; next: {command_for([receipt.vessel])}")

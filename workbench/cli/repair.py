@@ -24,22 +24,22 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     still wrong.
     """
     from kempf.flows.jobs.repair_warehouse import repair
-    from kempf.warehouse.migrations.chain import mend_marker
+    from kempf.warehouse.migrations.chain import repair_marker
     from kempf.warehouse.store import Warehouse
     from kempf.warehouse.verify import verify
 
     warehouse = Warehouse(uri)
-    mended = mend_marker(warehouse)
+    repaired = repair_marker(warehouse)
     with progress_bar() as progress:
         problems = verify(warehouse, lambda what: progress(0, 1, what))
     if problems:
         confirm(f"{counted(len(problems), 'problem')}, the first: {problems[0].words.rstrip('.')}", yes=yes)
     with progress_bar() as progress:
         outcome = repair(warehouse, progress)
-    if mended:
+    if repaired:
         outcome.done.insert(0, "The file that marks the warehouse was written anew.")
     if as_json:
-        print_json(outcome.show())
+        print_json(outcome.as_json())
     else:
         for words in outcome.done:
             click.echo(one_line(words))

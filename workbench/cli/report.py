@@ -46,7 +46,7 @@ def command(
     own = own.beside(mine)
     with progress_bar() as progress:
         report = make_report(warehouse, vessel, spec, own, progress, say=lambda line: click.echo(line, err=True))
-    write_new(path, report.html, "--output")
+    write_new(path, report.html)
     if as_json:
         print_json(
             {

@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, ThresholdExceeded
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
@@ -55,7 +56,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
         from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 
         with progress_bar() as progress:
-            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).show()]
+            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).as_json()]
     elif os.environ.get("PREFECT_API_URL"):
         from kempf.flows.fleet.flows import reports_of
 
@@ -71,7 +72,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
     else:
         head = ["vessel", "status", "logs", "reread", "segments", "new_sets", "kept_sets", "verified", "failures"]
         rows = [[str(r[k]) for k in head[:-2]] + [_counts(r["verified"]), str(len(r["failures"]))] for r in reports]
-        print_table([name.replace("_", " ") for name in head], rows)
+        print_table([as_words(name) for name in head], rows)
         for report in reports:
             for failure in report["failures"]:
                 click.echo(f"{report['vessel']}, {failure['what']}: {failure['error']['message']}", err=True)

@@ -10,7 +10,8 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import folder_option, json_option
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
@@ -37,7 +38,7 @@ def command(folder: Path, as_json: bool) -> None:
             "cannot_write", f"Writing to {folder} failed: {error.strerror or error}.", "Give another folder."
         ) from error
     if as_json:
-        print_json({**reproduction.show(), "figures": [str(path) for path in figures]})
+        print_json({**reproduction.as_json(), "figures": [str(path) for path in figures]})
         return
     _print_reproduction(reproduction)
     click.echo(click.style("Figures", bold=True))
@@ -72,7 +73,7 @@ def _print_reproduction(reproduction: Reproduction) -> None:
 
 
 def _print_experiment(reproduction: Reproduction, experiment: Experiment) -> None:
-    shown = experiment.show()
+    shown = experiment.as_json()
     rows = [
         [
             name,

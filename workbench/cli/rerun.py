@@ -10,7 +10,8 @@ import click
 from kempf.schemas.errors import DataRejected, ThresholdExceeded, UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.rerun_all import Verification
@@ -98,7 +99,7 @@ def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) 
     with progress_bar() as progress:
         result = rerun(warehouse, set_id, tolerance, progress)
     if as_json:
-        print_json(result.show())
+        print_json(result.as_json())
     else:
         _print_rerun(result)
     if "different" in (result.verdict, *result.rests_on.values()):
@@ -124,7 +125,7 @@ def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afres
     with progress_bar() as progress:
         verification = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=progress)
     if as_json:
-        print_json(verification.show())
+        print_json(verification.as_json())
     else:
         _print_verification(verification)
     counts = verification.counts()

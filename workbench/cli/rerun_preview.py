@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import DataRejected, ThresholdExceeded
-from kempf.workbench.terminal import number, print_json, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.parameter_changes import Move
@@ -40,8 +41,8 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
             {
                 **_counts(previews),
                 "parameters": shown,
-                "vessels": [vessel_preview.show() for vessel_preview in previews],
-                "moves": [m.show() for m in moves],
+                "vessels": [vessel_preview.as_json() for vessel_preview in previews],
+                "moves": [m.as_json() for m in moves],
                 **({"adopted": [vars(equivalent) for equivalent in adopted]} if adopt else {}),
             }
         )

@@ -12,7 +12,8 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli import correct_segments
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import one_line, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment
@@ -81,11 +82,12 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
 def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str], file_of: Mapping[str, str]) -> None:
     """Print a table, a zigzag a row; with the log where those of several logs begin alike."""
     from kempf.warehouse.instant import iso_utc
+    from kempf.workbench.documents.manoeuvres import logs_begin_alike
 
-    logs_at: dict[tuple[str, str], set[str]] = {}
+    by_vessel: dict[str, list[tuple[str, str]]] = {}
     for s in zigzags:
-        logs_at.setdefault((s.vessel, iso_utc(s.start_utc_ns)[:16]), set()).add(s.log_id)
-    alike = any(len(logs) > 1 for logs in logs_at.values())
+        by_vessel.setdefault(s.vessel, []).append((iso_utc(s.start_utc_ns), s.log_id))
+    alike = any(map(logs_begin_alike, by_vessel.values()))
     rows = [
         [
             short[s.segment_id],

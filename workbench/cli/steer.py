@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.steer_vessel import Steered, Tried
@@ -145,7 +147,7 @@ def _print_steered(outcome: Steered, figure: Path | None, *, verbose: bool) -> N
     shown = [_law(tried) for tried in outcome.laws]
     rows = [
         (
-            f"{key.removesuffix('_deg').replace('_', ' ')}, deg" if key.endswith("_deg") else _WORDS.get(key, key),
+            f"{as_words(key.removesuffix('_deg'))}, deg" if key.endswith("_deg") else _WORDS.get(key, key),
             group,
             key,
         )

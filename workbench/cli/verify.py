@@ -26,7 +26,7 @@ def command(uri: str, as_json: bool) -> None:
     with progress_bar() as progress:
         problems = verify(Warehouse(uri), lambda what: progress(0, 1, what))
     if as_json:
-        print_json([problem.show() for problem in problems])
+        print_json([problem.as_json() for problem in problems])
     else:
         for problem in problems:
             click.echo(one_line(problem.words))

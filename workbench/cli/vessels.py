@@ -9,7 +9,8 @@ import click
 from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
-from kempf.workbench.terminal import counted, number, print_json, print_table
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import counted, print_json, print_table
 
 
 @click.group("vessels", cls=GivenOnceGroup)
@@ -80,7 +81,7 @@ def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) 
 @json_option
 def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a vessel and all her logs count no longer. Nothing is deleted; `kempf history --as-of` still knows them."""
-    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.affected_sets import of_logs
     from kempf.flows.jobs.remove_logs import remove_vessel
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
@@ -89,9 +90,9 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     vessels.require(warehouse, name)
     held = logs.current(warehouse, name)
     confirm(what_goes(of_logs(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
-    following = remove_vessel(warehouse, name, reason)
+    affected = remove_vessel(warehouse, name, reason)
     if as_json:
-        print_json({"vessel": name, "removed": True, "following": following.show() if following else None})
+        print_json({"vessel": name, "removed": True, "following": affected.as_json() if affected else None})
     else:
         click.echo(f"{name}: removed")
 
@@ -105,7 +106,7 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
 @json_option
 def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a vessel another name: her logs are read for it again, her models are identified again by `reprocess`."""
-    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.affected_sets import of_logs
     from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import rename_vessel
     from kempf.warehouse import logs, vessels

@@ -8,7 +8,8 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+from kempf.workbench.numbers import number
+from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 
 @click.command("what-if", cls=GivenOnce)
@@ -34,7 +35,7 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
     with progress_bar() as progress:
         answer = what_if(Warehouse(uri), vessel, parameter, set_id, segment_id, progress)
     if as_json:
-        print_json(answer.show())
+        print_json(answer.as_json())
         return
     rows = [
         [

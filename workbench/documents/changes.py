@@ -26,7 +26,7 @@ class Examined:
     #: How many are left out, by the reason.
     left_out: dict[str, int]
 
-    def show(self, figure: str | None = None) -> dict[str, Any]:
+    def as_json(self, figure: str | None = None) -> dict[str, Any]:
         """Return it as JSON content.
 
         Parameters
@@ -86,7 +86,7 @@ def changes_document(vessel: str, of: History, changes: list[dict[str, Any]]) ->
     Parameters
     ----------
     changes : list of dict
-        Of each model and estimator, see `Examined.show`.
+        Of each model and estimator, see `Examined.as_json`.
     """
     return {"vessel": vessel, "history": history_rows(vessel, of), "changes": changes}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,10 +37,22 @@ def listed_manoeuvres(warehouse: Warehouse, vessel: str | None) -> ListedManoeuv
     against = marks(warehouse, vessel)
     documents = [
         {
-            **segment.show(names[segment.ingest_id]),
+            **segment.as_json(names[segment.ingest_id]),
             "channels": list(examined[segment.ingest_id].findings) if segment.ingest_id in examined else [],
             "marks": against.get(segment.segment_id, []),
         }
         for segment in manoeuvres
     ]
     return ListedManoeuvres(manoeuvres, documents)
+
+
+def logs_begin_alike(manoeuvres: Iterable[tuple[str, str]]) -> bool:
+    """Return whether manoeuvres of several logs begin in the same minute, as where a logger has no calendar.
+
+    Parameters
+    ----------
+    manoeuvres : iterable of (str, str)
+        Start, ISO 8601, and log of each of a vessel's.
+    """
+    log_at: dict[str, str] = {}
+    return any(log_at.setdefault(start[:16], log) != log for start, log in manoeuvres)

@@ -81,11 +81,11 @@ def prediction_document(
     figure : str, optional
         Where it is drawn.
     """
-    document = predicted.show()
+    document = predicted.as_json()
     document["full_scale"] = _full_scale(predicted.basis.particulars, document)
     if measured is not None:
         document |= {
-            "measured": [manoeuvre.show() for manoeuvre in measured],
+            "measured": [manoeuvre.as_json() for manoeuvre in measured],
             "judged": judged(measured),
             "one_sided": [{**vars(found), "sentence": sentence_of(found)} for found in one_sided(measured)],
             "other_orders": dict(others),

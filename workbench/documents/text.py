@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from kempf.warehouse.canonical import plain
+
 
 def json_text(content: Any, *, ascii_only: bool = False) -> str:
     """Return content as JSON without a line end; what is not finite becomes null.
@@ -22,14 +24,4 @@ def json_text(content: Any, *, ascii_only: bool = False) -> str:
       "k": null
     }
     """
-    return json.dumps(_finite(content), indent=2, ensure_ascii=ascii_only)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not (abs(value) < float("inf")):
-        return None
-    return value
+    return json.dumps(plain(content), indent=2, ensure_ascii=ascii_only)

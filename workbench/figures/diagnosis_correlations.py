@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.figures.diagnosis_style import BAND, FULL, INK, PLAIN, new_figure, style
 
 #: in the order of the columns; the others stand in the table
@@ -61,7 +62,7 @@ def draw_correlations(
         figure = new_figure(0.9 + 1.5 * len(rows))
         panels = figure.subplots(len(rows), len(columns), sharey=True, sharex=True, squeeze=False)
         for row, channel in zip(panels, rows, strict=True):
-            row[0].set_ylabel(channel.replace("_", " "))
+            row[0].set_ylabel(as_words(channel))
             for panel, other in zip(row, columns, strict=True):
                 correlation = last.get((channel, other))
                 if correlation is None:
@@ -95,7 +96,7 @@ def describe_correlations(after: Mapping[str, Any]) -> str:
     by_pair = pairs(after)
     worst = sorted(by_pair, key=lambda key: (-by_pair[key]["outside"] / len(by_pair[key]["lag_s"]), key))[:3]
     words = "; ".join(
-        f"{channel.replace('_', ' ')} with {WORDS[other]}, {by_pair[channel, other]['outside']} of "
+        f"{as_words(channel)} with {WORDS[other]}, {by_pair[channel, other]['outside']} of "
         f"{len(by_pair[channel, other]['lag_s'])}"
         for channel, other in worst
     )

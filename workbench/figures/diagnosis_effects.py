@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.figures.diagnosis_style import INK, SET_COLOURS, new_figure, style
-from kempf.workbench.report.content import EffectRow
-from kempf.workbench.report.numbers import with_error
+from kempf.workbench.numbers import with_error
 
 _SHOWN, _OTHER = 14, "#a5a6a8"
 #: expected sizes further from 0 than this many standard errors are drawn at the edge

@@ -9,6 +9,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.schemas.diagnosis_evidence import FittedModel
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.figures.diagnosis_style import FULL, INK, LIMIT, PLAIN, new_figure, style
 
 _MARKERS = (("o", "-"), ("s", "--"), ("^", ":"))
@@ -45,7 +46,7 @@ def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
             for k, values in enumerate(runs):
                 x, y = np.full(values.size, k + shift), np.minimum(values, edge)
                 error.plot(x, y, marker, ms=3, color=colour, alpha=0.45, mec="none", ls="")
-            label = f"{name.replace('_', ' ')} ({middle} of {runs[0].size})"
+            label = f"{as_words(name)} ({middle} of {runs[0].size})"
             mean = [100.0 * getattr(model, f"{name}_error") for model in ladder]
             error.plot(at + shift, mean, color=colour, ls=line, marker=marker, ms=6, label=label)
             for x, y, model in zip(at + shift, mean, ladder, strict=True):

@@ -34,7 +34,7 @@ def draw_overlay(shown: ManoeuvreEvidence, first: str, last: str) -> Any:
         for k, i in enumerate(used):
             panel, below = panels[2 * k : 2 * k + 2]
             words, unit, factor = CHANNELS[i]
-            draw_dots(panel, shown.time_s, factor * shown.measured[:, i], "measured")
+            draw_dots(panel, shown.time_s, factor * shown.measured[:, i])
             for label, predicted, colour, line in models:
                 panel.plot(shown.time_s, factor * predicted.free_run[:, i], color=colour, ls=line, label=label)
                 below.plot(shown.time_s, factor * predicted.free_run_error[:, i], color=colour, ls=line, lw=0.9)

@@ -125,7 +125,7 @@ def framed_figure(height_in: float, legend_in: float) -> Any:
     return figure
 
 
-def draw_dots(panel: Any, x: Float, y: Float, label: str) -> None:
+def draw_dots(panel: Any, x: Float, y: Float) -> None:
     """Draw measurements as dots in ink, all in one path: a symbol for each would be ten times as long a text.
 
     Parameters
@@ -138,7 +138,7 @@ def draw_dots(panel: Any, x: Float, y: Float, label: str) -> None:
     x_pairs = np.column_stack([x[known], x[known] + 1e-3, np.full(known.sum(), np.nan)])
     y_pairs = np.column_stack([y[known], y[known], np.full(known.sum(), np.nan)])
     panel.plot(x_pairs.ravel(), y_pairs.ravel(), color=INK, lw=1.7, solid_capstyle="round")
-    panel.plot([], [], ".", ms=4, mec="none", color=INK, label=label)
+    panel.plot([], [], ".", ms=4, mec="none", color=INK, label="measured")
 
 
 def bytes_of(figure: Any, form: Literal["svg", "png"] = "svg") -> bytes:

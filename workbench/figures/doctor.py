@@ -11,6 +11,7 @@ from kempf.flows.jobs.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import Figure
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.figures.drawn import pyplot, save
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def _rudder(panel: Axes, log: Log) -> None:
     for name in ("rudder_order", "rudder_angle"):
         if name in log.series:
             series = log.series[name]
-            _line(panel, origin, series.time_utc_ns, np.rad2deg(series.value), name.replace("_", " "))
+            _line(panel, origin, series.time_utc_ns, np.rad2deg(series.value), as_words(name))
     panel.set_ylabel("rudder, deg")
     _finish(panel)
 

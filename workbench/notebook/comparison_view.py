@@ -28,7 +28,7 @@ class ComparisonView:
     @cached_property
     def document(self) -> dict[str, Any]:
         """What ``kempf compare --json`` prints."""
-        return self.comparison.show()
+        return self.comparison.as_json()
 
     @cached_property
     def table(self) -> pl.DataFrame:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.notebook.frames import as_html, frame_of
 
 if TYPE_CHECKING:
@@ -43,7 +44,7 @@ class DiagnosisView:
     @cached_property
     def document(self) -> dict[str, Any]:
         """What ``kempf diagnose --json`` prints."""
-        return self.diagnosis.show()
+        return self.diagnosis.as_json()
 
     @property
     def verdict(self) -> str:
@@ -71,5 +72,5 @@ class DiagnosisView:
         return frame_of(self.document["candidates"], _CANDIDATE)
 
     def _repr_html_(self) -> str:
-        title = f"{self.diagnosis.vessel}: {self.verdict.replace('_', ' ')}"
+        title = f"{self.diagnosis.vessel}: {as_words(self.verdict)}"
         return as_html(title, self.sentences, [self.ladder, self.candidates.filter(pl.col("score").is_not_null())])

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import polars as pl
 
+from kempf.flows.process.configuration import configured_warehouse
 from kempf.warehouse import vessels
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.cli.options import configured_warehouse
 from kempf.workbench.notebook.frames import frame_of
 from kempf.workbench.notebook.vessel_view import VesselView
 

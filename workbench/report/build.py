@@ -19,7 +19,8 @@ from kempf.warehouse import code_version, examinations, vessels
 from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.report.content import EffectRow, ReportContent, ShownManoeuvre
+from kempf.workbench.effect_row import EffectRow
+from kempf.workbench.report.content import ReportContent, ShownManoeuvre
 from kempf.workbench.report.page import page
 from kempf.workbench.report.wording import ReportWording, wording_of
 

@@ -7,10 +7,10 @@ import numpy as np
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
 from kempf.warehouse.instant import iso_utc
+from kempf.workbench.charts.bins import Shown
+from kempf.workbench.charts.channels import LATERAL, derived, entry
+from kempf.workbench.charts.frames import encoded
 from kempf.workbench.report.content import ChartBlock, PictureBlock
-from kempf.workbench.web.data.bins import Shown
-from kempf.workbench.web.data.frames import encoded
-from kempf.workbench.web.pages.series import LATERAL, derived, entry
 
 _RUDDER = "rudder_angle"
 #: columns of what a model predicts

@@ -4,34 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
 from typing import Any, Literal
 
-from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter, ManoeuvreEvidence
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, ManoeuvreEvidence
+from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.report.wording import ReportWording
-
-
-@dataclass(frozen=True)
-class EffectRow:
-    """One effect of the catalogue beside the first model."""
-
-    #: title, verdict, why: The verdict in the report's words.
-    title: str
-    verdict: str
-    why: str
-    #: Of the confusion set that the report claims it in; empty where it claims none.
-    set_id: str
-    #: score, p_adjusted, absorption: NaN where it cannot be tested.
-    score: float
-    p_adjusted: float
-    absorption: float
-    #: Expected size of each of its parameters.
-    changes: tuple[FittedParameter, ...]
-
-    @property
-    def tested(self) -> bool:
-        """Whether it has a score."""
-        return isfinite(self.score)
 
 
 @dataclass(frozen=True)
@@ -107,7 +84,7 @@ class ChartBlock:
 
     label: str
     picture: PictureBlock
-    #: As `kempf.workbench.web.data.frames.encoded` makes it.
+    #: As `kempf.workbench.charts.frames.encoded` makes it.
     frame: bytes
     #: ``name``, ``unit``, ``words``, ``source``, ``shown``.
     channels: Sequence[Mapping[str, Any]]

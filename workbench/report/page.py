@@ -10,10 +10,10 @@ from hashlib import sha256
 from jinja2 import ChoiceLoader, Environment, PackageLoader, PrefixLoader, StrictUndefined
 from markupsafe import Markup
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.report import sections
 from kempf.workbench.report.content import Block, ReportContent
-from kempf.workbench.web.static_files import contents
-from kempf.workbench.web.templating import words
+from kempf.workbench.static_files import contents
 
 #: what fills a section, by its anchor; `ReportWording.sections` has the order and the titles
 _BLOCKS: dict[str, Callable[[ReportContent], list[Block]]] = {
@@ -83,5 +83,5 @@ def _templates() -> Environment:
     )
     environment.filters["base64"] = lambda content: b64encode(content).decode("ascii")
     environment.filters["data_uri"] = lambda svg: f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"
-    environment.filters["words"] = words
+    environment.filters["words"] = as_words
     return environment

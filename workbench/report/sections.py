@@ -7,6 +7,8 @@ from math import isfinite
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import FittedParameter
+from kempf.schemas.enumeration import as_words
+from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
@@ -20,11 +22,11 @@ from kempf.workbench.figures import (
     diagnosis_zigzag,
 )
 from kempf.workbench.figures.diagnosis_style import bytes_of
+from kempf.workbench.numbers import with_error
 from kempf.workbench.report.charts import chart_of
 from kempf.workbench.report.content import (
     Block,
     Cell,
-    EffectRow,
     HeadingBlock,
     PictureBlock,
     ReportContent,
@@ -33,7 +35,6 @@ from kempf.workbench.report.content import (
     TableBlock,
     TextBlock,
 )
-from kempf.workbench.report.numbers import with_error
 
 _CHANNELS = {"heading": "heading", "yaw_rate": "yaw rate", "lateral_speed": "lateral speed"}
 
@@ -210,15 +211,15 @@ def where(content: ReportContent) -> list[Block]:
         for name, last in places.after.get(group, {}).items():
             if not last["n"]:
                 continue
-            row = [words, names.get(name, name.replace("_", " ")), str(last["n"])]
+            row = [words, names.get(name, as_words(name)), str(last["n"])]
             row += [_rms(places.before[group][name]), _rms(last)] if content.evidence.improved else [_rms(last)]
             rows.append([*row, f"{last['band'][0]:.2f} to {last['band'][1]:.2f}", "outside" if last["outside"] else ""])
     head = ["by", "group", "innovations", *_models(content), "band", "outside"]
     blocks: list[Block] = [TableBlock("Whitened innovations, root mean square", head, rows, range(2, len(head) - 2))]
     standing = [
         (
-            *(place["of"].removeprefix("by_").replace("_", " "), place["which"].replace("_", " ")),
-            *(place["channel"].replace("_", " "), str(place["n"]), _rms(place), _p_value(place["p_adjusted"])),
+            *(as_words(place["of"].removeprefix("by_")), as_words(place["which"])),
+            *(as_words(place["channel"]), str(place["n"]), _rms(place), _p_value(place["p_adjusted"])),
         )
         for place in places.after.get("stands_out", ())
     ]
@@ -251,7 +252,7 @@ def _worst(content: ReportContent) -> TableBlock:
             rows.append(
                 (
                     *(names[window["run"]], SampleBadge(held), window["measure"]),
-                    *(window["channel"].replace("_", " "), (window["phase"] or "").replace("_", " ")),
+                    *(as_words(window["channel"]), as_words(window["phase"] or "")),
                     *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", _clock(window["start"]), size),
                 )
             )
@@ -278,7 +279,7 @@ def correlations(content: ReportContent) -> list[Block]:
     first, last = diagnosis_correlations.pairs(before), diagnosis_correlations.pairs(after)
     rows = []
     for key, pair in last.items():
-        row = [key[0].replace("_", " "), diagnosis_correlations.WORDS[key[1]], str(len(pair["lag_s"]))]
+        row = [as_words(key[0]), diagnosis_correlations.WORDS[key[1]], str(len(pair["lag_s"]))]
         row += [str(first[key]["outside"]), str(pair["outside"])] if improved else [str(pair["outside"])]
         rows.append([*row, f"{pair['largest']:+.3f} at {pair['largest_lag_s']:.0f} s", f"{pair['band']:.3f}"])
     outside = [f"outside, {model}" for model in _models(content)]
@@ -319,7 +320,7 @@ def confusion(content: ReportContent) -> list[Block]:
             sizes = "; ".join(
                 f"{p.name.rpartition('.')[2]} = {with_error(p.value, p.std, p.unit)}" for p in candidate.refitted
             )
-            rows.append((group["set_id"], name.replace("_", " "), sizes, candidate.separated_by))
+            rows.append((group["set_id"], as_words(name), sizes, candidate.separated_by))
     if rows:
         head = ("set", "effect", "refitted, ± 1 s.e.", "distinguished by")
         blocks.append(TableBlock("Effects that the refit confirmed, by confusion set", head, rows))

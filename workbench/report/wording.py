@@ -12,7 +12,7 @@ from shlex import quote
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
-from kempf.schemas.enumeration import listed
+from kempf.schemas.enumeration import as_words, listed
 
 #: the verdicts that claim an effect
 CLAIMING = ("explained", "ambiguous", "partly_explained")
@@ -97,7 +97,7 @@ def wording_of(
         diagnosed_model=diagnosed,
         first_model=first,
         last_model=last,
-        sections=_sections(verdict, evidence, diagnosed, first, last),
+        sections=_sections(verdict, evidence, diagnosed, first),
     )
 
 
@@ -157,7 +157,7 @@ def _next_steps(
     for candidate in content["candidates"]:
         missing = evidence.candidates[candidate["effect"]].missing_channels
         if missing and candidate["verdict"] == "not_testable":
-            channels = listed([channel.replace("_", " ") for channel in missing])
+            channels = listed([as_words(channel) for channel in missing])
             untested.setdefault(channels, []).append(candidate["title"])
     steps += [f"Log {channels}: without it {listed(names)} cannot be tested." for channels, names in untested.items()]
     if verdict != "insufficient_data" and not evidence.models[0].held_out_errors.size:
@@ -165,9 +165,7 @@ def _next_steps(
     return steps
 
 
-def _sections(
-    verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: str, last: str
-) -> dict[str, SectionWords]:
+def _sections(verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: str) -> dict[str, SectionWords]:
     claims, improved, found = verdict in CLAIMING, evidence.improved, evidence.found
     fitted = sum(not manoeuvre.held_out for manoeuvre in evidence.manoeuvres)
     by_legs = ", with the parameters fitted to legs" if evidence.by_legs else ""

@@ -20,12 +20,12 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.documents.text import json_text
-from kempf.workbench.web import static_files
+from kempf.workbench.web import static_routes
 from kempf.workbench.web.addresses import address_of, vessel_at
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data import reports
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.form_numbers import whole_number
 from kempf.workbench.web.guard import Guard
-from kempf.workbench.web.numbers import whole_number
 from kempf.workbench.web.pages import (
     changes,
     compare,
@@ -82,19 +82,19 @@ def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI
     """
     app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
     app.middleware("http")(Guard(settings))
-    static_files.serve(app)
-    desk = Desk(warehouse, state)
-    app.state.queue = desk.queue
-    _serve_pages(app, desk)
-    _serve_jobs(app, desk)
+    static_routes.serve(app)
+    app_state = AppState(warehouse, state)
+    app.state.queue = app_state.queue
+    _serve_pages(app, app_state)
+    _serve_jobs(app, app_state)
     for kind in (KempfError, HTTPException, Exception):
         app.add_exception_handler(kind, _refused)
     return app
 
 
-def _serve_pages(app: FastAPI, desk: Desk) -> None:
+def _serve_pages(app: FastAPI, app_state: AppState) -> None:
     def vessel_of(request: Request) -> str:
-        return vessel_at(desk.warehouse, request.path_params["vessel"])
+        return vessel_at(app_state.warehouse, request.path_params["vessel"])
 
     def serve(
         path: str, gather: Callable[[Request], Page] | None, document: Callable[[Request], Any] | None = None
@@ -105,26 +105,32 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
             app.add_route(path, lambda r: _shown(r, gather(r)))
 
     def serve_answer(
-        place: str, gather: Callable[[Desk, str, Fields], Page], document: Callable[[Desk, str, Fields], Any]
+        place: str, gather: Callable[[AppState, str, Fields], Page], document: Callable[[AppState, str, Fields], Any]
     ) -> None:
         serve(
             f"/v/{{vessel}}/{place}",
-            lambda r: gather(desk, vessel_of(r), r.query_params),
-            lambda r: document(desk, vessel_of(r), r.query_params),
+            lambda r: gather(app_state, vessel_of(r), r.query_params),
+            lambda r: document(app_state, vessel_of(r), r.query_params),
         )
 
     def named(key: str) -> Callable[[Request], str]:
         return lambda request: str(request.path_params[key])
 
     log_id, segment_id, set_id = named("log_id"), named("segment_id"), named("set_id")
-    serve("/", lambda r: fleet.gather(desk), lambda r: fleet.document(desk))
+    serve("/", lambda r: fleet.gather(app_state), lambda r: fleet.document(app_state))
     serve(
-        "/v/{vessel}/ladder", lambda r: ladder.gather(desk, vessel_of(r)), lambda r: ladder.document(desk, vessel_of(r))
+        "/v/{vessel}/ladder",
+        lambda r: ladder.gather(app_state, vessel_of(r)),
+        lambda r: ladder.document(app_state, vessel_of(r)),
     )
-    serve("/v/{vessel}/segments", None, lambda r: vessel.manoeuvres_document(desk, vessel_of(r)))
-    serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(desk, vessel_of(r)))
-    serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(desk, vessel_of(r)))
-    serve("/v/{vessel}", lambda r: vessel.gather(desk, vessel_of(r)), lambda r: vessel.document(desk, vessel_of(r)))
+    serve("/v/{vessel}/segments", None, lambda r: vessel.manoeuvres_document(app_state, vessel_of(r)))
+    serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(app_state, vessel_of(r)))
+    serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(app_state, vessel_of(r)))
+    serve(
+        "/v/{vessel}",
+        lambda r: vessel.gather(app_state, vessel_of(r)),
+        lambda r: vessel.document(app_state, vessel_of(r)),
+    )
     for place, page in (
         ("model", model),
         ("predict", predict),
@@ -134,84 +140,88 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         ("changes", changes),
     ):
         serve_answer(place, page.gather, page.document)
-    serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
-    app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))
-    app.add_route("/segments/{segment_id}/predicted", lambda r: _predicted(desk, r))
-    serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))
+    serve("/compare", lambda r: compare.gather(app_state, *_both(r)), lambda r: compare.document(app_state, *_both(r)))
+    app.add_route("/logs/{log_id}/series", lambda r: _series(app_state, r))
+    app.add_route("/segments/{segment_id}/predicted", lambda r: _predicted(app_state, r))
+    serve(
+        "/logs/{log_id}",
+        lambda r: log.gather(app_state, log_id(r), *_window(r)),
+        lambda r: log.document(app_state, log_id(r)),
+    )
     serve(
         "/segments/{segment_id}",
-        lambda r: manoeuvre.gather(desk, segment_id(r), r.query_params),
-        lambda r: manoeuvre.document(desk, segment_id(r)),
+        lambda r: manoeuvre.gather(app_state, segment_id(r), r.query_params),
+        lambda r: manoeuvre.document(app_state, segment_id(r)),
     )
     serve(
         "/sets/{set_id}",
-        lambda r: parameter_set.gather(desk, set_id(r)),
-        lambda r: parameter_set.document(desk, set_id(r)),
+        lambda r: parameter_set.gather(app_state, set_id(r)),
+        lambda r: parameter_set.document(app_state, set_id(r)),
     )
     serve(
         "/diagnoses/{name}",
-        lambda r: diagnosis.gather(desk, named("name")(r)),
-        lambda r: diagnosis.document(desk, named("name")(r)),
+        lambda r: diagnosis.gather(app_state, named("name")(r)),
+        lambda r: diagnosis.document(app_state, named("name")(r)),
     )
     serve("/effects", lambda r: effects.gather_list(), lambda r: effects.list_document())
     serve(
         "/effects/{name}",
-        lambda r: effects.gather(desk, named("name")(r)),
+        lambda r: effects.gather(app_state, named("name")(r)),
         lambda r: effects.document(named("name")(r)),
     )
-    app.add_route("/go", lambda r: RedirectResponse(address_of(desk.warehouse, r.query_params.get("q", "")), 303))
+    app.add_route("/go", lambda r: RedirectResponse(address_of(app_state.warehouse, r.query_params.get("q", "")), 303))
 
 
-def _serve_jobs(app: FastAPI, desk: Desk) -> None:
+def _serve_jobs(app: FastAPI, app_state: AppState) -> None:
     def shown(request: Request) -> Response:
-        return _shown(request, job.gather(desk, request.path_params["name"]))
+        return _shown(request, job.gather(app_state, request.path_params["name"]))
 
     def document(request: Request) -> Response:
         after = whole_number(request.query_params.get("after", "0"))
-        return _json(job.document(desk, request.path_params["name"], after or 0))
+        return _json(job.document(app_state, request.path_params["name"], after or 0))
 
     async def ask(request: Request) -> Response:
         form = await _form(request)
-        asked = await run_in_threadpool(job.ask, desk, form)
+        asked = await run_in_threadpool(job.ask, app_state, form)
         return RedirectResponse(job.place_of(asked), 303)
 
     async def again(request: Request) -> Response:
-        asked = await run_in_threadpool(desk.queue.again, request.path_params["name"])
+        asked = await run_in_threadpool(app_state.queue.again, request.path_params["name"])
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
     async def take_in(request: Request) -> Response:
-        received = await desk.uploads.receive(request)
-        asked = await run_in_threadpool(ingest.ask, desk, received)
+        received = await app_state.uploads.receive(request)
+        asked = await run_in_threadpool(ingest.ask, app_state, received)
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
     async def with_profile(request: Request) -> Response:
         form = await _form(request, _MOST_PROFILE)
-        failed = await run_in_threadpool(desk.queue.get, request.path_params["name"])
-        asked = await run_in_threadpool(ingest.ask_with_profile, desk, failed, form.get("profile", ""))
+        failed = await run_in_threadpool(app_state.queue.get, request.path_params["name"])
+        asked = await run_in_threadpool(ingest.ask_with_profile, app_state, failed, form.get("profile", ""))
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
     async def note(request: Request) -> Response:
         form = await _form(request)
-        return RedirectResponse(await run_in_threadpool(notes.write, desk, form), 303)
+        return RedirectResponse(await run_in_threadpool(notes.write, app_state, form), 303)
 
     async def cancel(request: Request) -> Response:
-        asked = await run_in_threadpool(desk.queue.cancel, request.path_params["name"])
+        asked = await run_in_threadpool(app_state.queue.cancel, request.path_params["name"])
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
     def report(request: Request) -> Response:
-        asked = desk.queue.get(request.path_params["name"])
+        asked = app_state.queue.get(request.path_params["name"])
         # never shown among the pages: its script is its own
-        return FileResponse(reports.of_job(desk.state, asked), filename=asked.result["file_name"])
+        return FileResponse(reports.of_job(app_state.folder, asked), filename=asked.result["file_name"])
 
     app.add_route("/jobs/{name}.json", document)
     app.add_route("/jobs/{name}/report", report)
     app.add_route("/jobs/{name}", shown)
-    app.add_route("/jobs", lambda r: _shown(r, jobs.gather(desk)))
+    app.add_route("/jobs", lambda r: _shown(r, jobs.gather(app_state)))
     app.add_route("/jobs", ask, methods=["POST"])
     app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
     app.add_route("/jobs/{name}/again", again, methods=["POST"])
     app.add_route("/jobs/{name}/profile", with_profile, methods=["POST"])
-    app.add_route("/ingest", lambda r: _shown(r, ingest.gather(desk)))
+    app.add_route("/ingest", lambda r: _shown(r, ingest.gather(app_state)))
     app.add_route("/ingest", take_in, methods=["POST"])
     app.add_route("/notes", note, methods=["POST"])
 
@@ -234,15 +244,15 @@ def _window(request: Request) -> tuple[str | None, str | None]:
     return request.query_params.get("from"), request.query_params.get("to")
 
 
-def _series(desk: Desk, request: Request) -> Response:
+def _series(app_state: AppState, request: Request) -> Response:
     channels = request.query_params.get("ch", "")
-    content = series.frame(desk, request.path_params["log_id"], channels, *_window(request), _bins(request))
+    content = series.frame(app_state, request.path_params["log_id"], channels, *_window(request), _bins(request))
     return Response(content, media_type="application/octet-stream")
 
 
-def _predicted(desk: Desk, request: Request) -> Response:
+def _predicted(app_state: AppState, request: Request) -> Response:
     name = request.path_params["segment_id"]
-    content = series.predicted_frame(desk, name, request.query_params, _bins(request))
+    content = series.predicted_frame(app_state, name, request.query_params, _bins(request))
     return Response(content, media_type="application/octet-stream")
 
 
@@ -290,5 +300,5 @@ def _refused(request: Request, error: Exception) -> Response:
         traceback.print_exception(failure, file=sys.stderr)
     status = _STATUS_OF_CODE.get(failure.code, _STATUS[failure.exit_code])
     if request.url.path.endswith((".json", "/series", "/predicted")):
-        return Response(json_text(failure.to_json()) + "\n", status, media_type="application/json")
+        return Response(json_text(failure.as_json()) + "\n", status, media_type="application/json")
     return HTMLResponse(_html(request, error_page.gather(failure, status)), status)

@@ -13,7 +13,7 @@ import uvicorn
 from kempf.schemas.errors import UsageError
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.app import create_app
-from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.settings import Settings
 
 
@@ -66,12 +66,12 @@ def serve(warehouse: Warehouse, settings: Settings, state: Path, bound: socket.s
     config = uvicorn.Config(
         create_app(warehouse, settings, state), log_level="warning", access_log=False, server_header=False
     )
-    keeper = None
+    supervisor = None
     if settings.token is not None:
-        keeper = Keeper(state, warehouse)
-        keeper.start()
+        supervisor = EngineSupervisor(state, warehouse)
+        supervisor.start()
     try:
         uvicorn.Server(config).run(sockets=[bound])
     finally:
-        if keeper is not None:
-            keeper.stop()
+        if supervisor is not None:
+            supervisor.stop()

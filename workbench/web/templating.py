@@ -8,11 +8,11 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from kempf.schemas.enumeration import at_the_beginning
+from kempf.schemas.enumeration import as_words, at_the_beginning
 from kempf.workbench.documents.tried import refits
 from kempf.workbench.effect_verdicts import effect_verdict
+from kempf.workbench.numbers import number, percent
 from kempf.workbench.rungs import in_words, sized
-from kempf.workbench.terminal import number
 from kempf.workbench.web import wording
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.pages.corrections import as_asked, undoing
@@ -21,11 +21,6 @@ from kempf.workbench.web.pages.corrections import as_asked, undoing
 def rendered(template: str, **content: Any) -> str:
     """Return a page as HTML; a name that is not given is an error."""
     return _templates().get_template(template).render(**content)
-
-
-def words(name: str) -> str:
-    """Return a name of the code in words."""
-    return name.replace("_", " ")
 
 
 @cache
@@ -40,11 +35,11 @@ def _templates() -> Environment:
     filters: dict[str, Callable[..., Any]] = {
         "number": number,
         "minute": lambda iso: iso[:16].replace("T", " "),
-        "words": words,
+        "words": as_words,
         "error": in_words,
         "sized": sized,
         "probability": wording.probability,
-        "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
+        "percent": percent,
         "vessel_address": of_vessel,
         "as_asked": as_asked,
         "undoing": undoing,

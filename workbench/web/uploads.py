@@ -15,7 +15,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import Request
 
 from kempf.schemas.errors import KempfError, UsageError
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.whole_file import keep_newest, whole_file
 
 #: bytes of all files of a form together, files of a form, forms that may arrive at once
 MOST_BYTES, MOST_FILES, AT_ONCE = 256 * 2**20, 40, 2
@@ -98,19 +98,17 @@ class Uploads:
             shutil.copyfileobj(file.file, target, _BLOCK)
         return f"{to.parent.name}/{to.name}"
 
-    def store_text(self, text: str, name: str) -> str:
-        """Keep a text that was written on a page as a file, and return its name as of one that was sent."""
+    def store_profile(self, text: str) -> str:
+        """Keep a profile that was written on a page as a file, and return its name as of one that was sent."""
         data = text.encode()
-        to = self.folder / hashlib.sha256(data).hexdigest() / name
+        to = self.folder / hashlib.sha256(data).hexdigest() / "profile.yaml"
         with whole_file(to) as passing:
             passing.write_bytes(data)
         self._forget_the_oldest()
         return f"{to.parent.name}/{to.name}"
 
     def _forget_the_oldest(self) -> None:
-        held = sorted(self.folder.glob("*"), key=lambda folder: (folder.stat().st_mtime_ns, folder.name))
-        for folder in held[:-_MOST_KEPT]:
-            shutil.rmtree(folder, ignore_errors=True)
+        keep_newest(self.folder, "*", _MOST_KEPT)
 
 
 def base_name(file_name: str) -> str:

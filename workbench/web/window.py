@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
-
-import numpy as np
+from contextlib import suppress
 
 from kempf.schemas.errors import UsageError
+from kempf.workbench.instants import utc_ns_of
 
 
 def instant(text: str) -> int:
-    """Return an instant of an address as UTC nanoseconds.
+    """Return an instant of an address as UTC nanoseconds; without a zone it is UTC.
 
     Raises
     ------
@@ -21,20 +20,20 @@ def instant(text: str) -> int:
     --------
     >>> instant("2025-05-03T07:47:01.5Z")
     1746258421500000000
+    >>> instant("2025-05-03T09:47:01.5+02:00")
+    1746258421500000000
     """
-    try:
-        if len(text) > 40:
-            raise ValueError
-        plain = text.removesuffix("Z").replace(" ", "T")
-        datetime.fromisoformat(plain[:19]).replace(tzinfo=UTC)  # numpy takes less for an instant than this
-        moment = np.datetime64(plain, "ns")
-    except ValueError:
+    utc_ns = None
+    with suppress(UsageError):
+        utc_ns = utc_ns_of(text, "the address")
+    # beyond what 64 bits hold lies no log
+    if utc_ns is None or abs(utc_ns) >= 2**63:
         raise UsageError(
             "instant_unreadable",
             f"{text[:60]!r} is no instant; expected UTC as 2025-05-03T07:47:01.5Z.",
             "Take the times out of the address to see everything.",
-        ) from None
-    return int(moment.astype(np.int64))
+        )
+    return utc_ns
 
 
 def window(asked_from: str | None, asked_to: str | None, start_utc_ns: int, end_utc_ns: int) -> tuple[int, int]:

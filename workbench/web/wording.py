@@ -7,7 +7,8 @@ from collections.abc import Mapping
 
 from markupsafe import Markup, escape
 
-from kempf.workbench.terminal import number
+from kempf.schemas.enumeration import as_words
+from kempf.workbench.numbers import number
 
 #: What to do after an error, by its code, where a page has other means than the options of a command.
 _NEXT_STEPS: Mapping[str, str] = {
@@ -112,8 +113,8 @@ def with_unit(key: str) -> str:
     """
     for unit in _UNITS:
         if key.endswith(f"_{unit}"):
-            return f"{key.removesuffix(f'_{unit}').replace('_', ' ')}, {_UNIT_WORDS.get(unit, unit)}"
-    return key.replace("_", " ")
+            return f"{as_words(key.removesuffix(f'_{unit}'))}, {_UNIT_WORDS.get(unit, unit)}"
+    return as_words(key)
 
 
 def probability(value: float) -> str:

@@ -18,8 +18,8 @@ from typing import Any
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.standing_model import PLAIN
 from kempf.schemas.errors import KempfError
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 
 
@@ -39,10 +39,10 @@ def examine(folder: Path) -> dict[str, Any]:
         read = time.perf_counter()
         found: dict[str, Any] = {"zigzags": [len(one.segments) for one in taken]}
         try:
-            stored, _ = diagnose_vessel(warehouse, folder.name, PLAIN)
+            stored, _ = diagnose_vessel(warehouse, folder.name, ModelSpec())
             found["diagnosis"] = dict(stored.content)
         except KempfError as error:
-            found |= error.to_json()
+            found |= error.as_json()
     done = time.perf_counter()
     return found | {"seconds": {"ingest": read - begun, "diagnose": done - read}}
 

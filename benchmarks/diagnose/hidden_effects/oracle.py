@@ -19,13 +19,13 @@ import numpy as np
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.predict.free_run import free_run
 from kempf.schemas.effects import catalogue
 from kempf.schemas.errors import KempfError
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 
 
@@ -44,7 +44,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
         ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         try:
-            found = assembled(warehouse, choose(warehouse, folder.name), PLAIN)
+            found = assembled(warehouse, choose(warehouse, folder.name), ModelSpec())
             chosen, left = split(found.runs)
             fitted = [found.runs[i] for i in chosen]
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
@@ -60,7 +60,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
                 "std": float(fits[1].std[6 + first]),
             }
         except KempfError as error:
-            return error.to_json()
+            return error.as_json()
 
 
 def all_with_the_truth(cases: Path, truth: Mapping[str, Mapping[str, Any]], out: Path) -> None:

@@ -25,11 +25,12 @@ from benchmarks.identify.prediction.compared import RUDDERS_DEG, ComparedShip, T
 from benchmarks.identify.prediction.plain_ship import slides
 from kempf.flows.jobs.add_effect import add_effect
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.hulls import HULLS, SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.model_spec import ModelSpec
 
 _SEED = 20261125
 _ASIDE = ("waves", "shallow_water", "roll_coupling")
@@ -50,11 +51,11 @@ def compared(number: int, *, diagnosed: bool) -> ComparedShip:
     with TemporaryDirectory() as place:
         warehouse = taken_in(files, Path(place))
         if diagnosed:
-            stored, _ = diagnose_vessel(warehouse, case.case_id, PLAIN)
+            stored, _ = diagnose_vessel(warehouse, case.case_id, ModelSpec())
             if case.effect not in stored.effects:
                 return ComparedShip(kind, case.case_id, case.effect, (), (), found=False)
         try:
-            add_effect(warehouse, case.case_id, case.effect, begin=(PLAIN, NONE_OF_ONES_OWN))
+            add_effect(warehouse, case.case_id, case.effect, begin=(ModelSpec(), NONE_OF_ONES_OWN))
         except KempfError as error:
             return ComparedShip(kind, case.case_id, case.effect, (), (error.message,))
         figures, refused, models = predicted_beside(warehouse, case.case_id, hull.trial_speed_m_s, truth)

@@ -16,9 +16,7 @@ from kempf.schemas.profile import ChannelMap
 _FRAMES = {"body-fixed": "earth-fixed components are expected", "earth-fixed": "body-fixed components are expected"}
 
 
-def as_content(
-    examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], log_format: str
-) -> dict[str, Any]:
+def as_json(examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
     """Return an examination as JSON content.
 
     Parameters

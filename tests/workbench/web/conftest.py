@@ -12,7 +12,7 @@ from starlette.testclient import TestClient
 
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.app import create_app
-from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.settings import Settings
 from tests.workbench.conftest import _filled, filled, logs, own  # noqa: F401
@@ -54,20 +54,20 @@ def writing(client: TestClient) -> TestClient:
 
 
 @contextmanager
-def at_work(place: Path, state: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:
+def at_work(place: Path, state: Path) -> Iterator[tuple[TestClient, EngineSupervisor, Queue]]:
     """A browser that may write at a warehouse's pages, and an engine at work."""
-    keeper = Keeper(state, Warehouse(str(place)))
-    keeper.start()
+    supervisor = EngineSupervisor(state, Warehouse(str(place)))
+    supervisor.start()
     try:
         with client_of(place, state) as client:
             client.get(f"/?token={TOKEN}")
-            yield client, keeper, Queue(state / "jobs.sqlite")
+            yield client, supervisor, Queue(state / "jobs.sqlite")
     finally:
-        keeper.stop()
+        supervisor.stop()
 
 
 @pytest.fixture
-def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:  # noqa: F811
+def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, EngineSupervisor, Queue]]:  # noqa: F811
     """A browser that may write, and an engine at work."""
     with at_work(own, tmp_path / "state") as one:
         yield one

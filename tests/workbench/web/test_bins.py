@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.workbench.web.data.bins import _BLOCKS, reduced
-from kempf.workbench.web.data.frames import decoded, encoded
+from kempf.workbench.charts.bins import _BLOCKS, reduced
+from kempf.workbench.charts.frames import encoded
+from tests.workbench.web.decoded import decoded
 
 START = 1_746_258_421_000_000_000
 

@@ -15,7 +15,7 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import notes, vessels
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.draw.history import draw_history
-from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from tests.history.made import step
 from tests.workbench.driving import kempf
 from tests.workbench.test_history_changes import VESSEL, made_sets, put
@@ -28,14 +28,14 @@ Open = Callable[[int, np.ndarray | None], TestClient]
 @contextmanager
 def at_work(place: Path, state: Path) -> Iterator[TestClient]:
     """A browser that may write, and an engine at work."""
-    keeper = Keeper(state, Warehouse(str(place)))
-    keeper.start()
+    supervisor = EngineSupervisor(state, Warehouse(str(place)))
+    supervisor.start()
     try:
         with client_of(place, state) as client:
             client.get(f"/?token={TOKEN}")
             yield client
     finally:
-        keeper.stop()
+        supervisor.stop()
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from kempf.flows.process.progress import Figures
+from kempf.workbench.web.jobs.job_progress import JobProgress
 from kempf.workbench.web.jobs.queue import FAILED, RUNNING, Queue, Tick
-from kempf.workbench.web.jobs.ticking import Ticking
 from tests.workbench.web.browsing import NEEDS_BROWSER, Server, opened
 from tests.workbench.web.conftest import until
 
@@ -114,7 +114,7 @@ def test_quick_iterations_are_written_together_and_none_is_lost(queue: Queue):
     name, written = running(queue), []
     tick = queue.tick
     queue.tick = lambda name, ticks: (written.append(len(ticks)), tick(name, ticks))[1]  # type: ignore[method-assign]
-    progress = Ticking(queue, name)
+    progress = JobProgress(queue, name)
     progress(0, 2, "fitting the plain model")
     for k in range(1, 101):
         progress.iterated(0, 2, "fitting the plain model", Figures(k, 1, float(k), None))

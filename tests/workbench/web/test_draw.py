@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from kempf.schemas.channels import CHANNELS
-from kempf.workbench.web.data.signs import SIGNS
+from kempf.workbench.charts.channels import LATERAL, derived, entry
+from kempf.workbench.charts.signs import SIGNS
 from kempf.workbench.web.draw.correlation import draw_correlation
 from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.draw.sailed import draw_sailed
 from kempf.workbench.web.draw.scale import ticks
-from kempf.workbench.web.pages.series import LATERAL, derived, entry
 
 
 def labels(figure: object) -> list[str]:

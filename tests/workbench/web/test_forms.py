@@ -12,12 +12,12 @@ import pytest
 from starlette.testclient import TestClient
 
 from kempf.workbench.web import uploads
-from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.jobs.queue import ACTIVE, Queue
 from tests.workbench.driving import kempf
 from tests.workbench.web.conftest import OURS, until
 
-Working = tuple[TestClient, Keeper, Queue]
+Working = tuple[TestClient, EngineSupervisor, Queue]
 
 
 def done(client: TestClient, answer: Any) -> dict[str, Any]:

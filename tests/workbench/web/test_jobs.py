@@ -10,7 +10,7 @@ import pytest
 from starlette.testclient import TestClient
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.jobs.queue import DONE, FAILED, MOST_WAITING, QUEUED, RUNNING, Queue, Tick
 from tests.workbench.driving import kempf, tree
 from tests.workbench.web.conftest import OURS, TOKEN, until
@@ -114,9 +114,9 @@ def test_a_form_that_cannot_be_done_says_why(writing: TestClient, form: dict[str
 
 
 def test_a_prediction_is_made_once_and_shown_as_the_command_prints_it(
-    working: tuple[TestClient, Keeper, Queue], own: Path
+    working: tuple[TestClient, EngineSupervisor, Queue], own: Path
 ):
-    client, keeper, queue = working
+    client, supervisor, queue = working
     assert "not made yet" in client.get("/v/mariner/model").text
     before = tree(own)
     form = {"kind": "predict", "vessel": "mariner", "set": "", "horizon": "free"}
@@ -126,8 +126,8 @@ def test_a_prediction_is_made_once_and_shown_as_the_command_prints_it(
     (place,) = places
     until(lambda: queue.get(place.rpartition("/")[2]).state == RUNNING)
     # the engine dies in the middle: another begins the job anew
-    assert keeper.process is not None and keeper.process.pid is not None
-    os.kill(keeper.process.pid, signal.SIGKILL)
+    assert supervisor.process is not None and supervisor.process.pid is not None
+    os.kill(supervisor.process.pid, signal.SIGKILL)
     until(lambda: client.get(place + ".json").json()["state"] == DONE)
     job = client.get(place + ".json").json()
     assert job["attempts"] in (1, 2) and [tick["what"] for tick in job["ticks"]][-1] == "predicted"
@@ -143,7 +143,9 @@ def test_a_prediction_is_made_once_and_shown_as_the_command_prints_it(
     assert client.get("/v/mariner/model?run=seg-0").status_code == 404
 
 
-def test_a_job_that_is_cancelled_ends_and_leaves_nothing(working: tuple[TestClient, Keeper, Queue], own: Path):
+def test_a_job_that_is_cancelled_ends_and_leaves_nothing(
+    working: tuple[TestClient, EngineSupervisor, Queue], own: Path
+):
     client, _, queue = working
     place = client.post("/jobs", data={"kind": "diagnose", "vessel": "mariner"}, headers=OURS).headers["location"]
     name = place.rpartition("/")[2]

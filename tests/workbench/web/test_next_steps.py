@@ -16,7 +16,7 @@ from kempf.flows.jobs.correct_segments import plan_for
 from kempf.flows.process.progress import silent
 from kempf.warehouse import aliases, segments
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.web.jobs.kinds import KINDS
+from kempf.workbench.web.jobs.kinds import KINDS, Work
 from kempf.workbench.web.jobs.queue import Queue
 from tests.late import VESSEL, some_effects
 from tests.workbench.driving import kempf
@@ -125,7 +125,7 @@ def test_the_report_is_downloaded_as_the_command_writes_it(late_diagnosed: Path,
         queue, (asked,) = Queue(state / "jobs.sqlite"), Queue(state / "jobs.sqlite").active()
         queue.take()
         with some_effects():
-            queue.finish(asked.id, KINDS["report"].work(Warehouse(str(place)), state, asked.arguments, silent))
+            queue.finish(asked.id, KINDS["report"].do(Work(Warehouse(str(place)), state, asked.arguments, silent)))
             written = kempf("report", "--vessel", VESSEL, "--warehouse", place, "--output", tmp_path / "it.html")
         assert written.code == 0, written
         page = client.get(job).text

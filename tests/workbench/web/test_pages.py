@@ -19,13 +19,13 @@ from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.warehouse import delta, logs, notes
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
+from kempf.workbench import static_files
 from kempf.workbench.cli.entry import main
-from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.data.frames import decoded
 from kempf.workbench.web.pages.spans import spans_of_lost
 from tests.workbench.driving import environment, kempf
 from tests.workbench.web.conftest import TOKEN, client_of
+from tests.workbench.web.decoded import decoded
 
 
 def ids(client: TestClient) -> dict[str, str]:
@@ -132,10 +132,12 @@ def test_a_printed_sheet_says_where_it_is_from_and_gives_no_token_away(client: T
 
 
 def test_a_log_is_read_once_however_often_it_is_looked_at(client: TestClient, monkeypatch: pytest.MonkeyPatch):
-    from kempf.workbench.web.data import kept
+    from kempf.workbench.web.data import channel_cache
 
     reads = []
-    monkeypatch.setattr(kept, "channels_of", lambda *a, of=kept.channels_of: (reads.append(a), of(*a))[1])
+    monkeypatch.setattr(
+        channel_cache, "channels_of", lambda *a, of=channel_cache.channels_of: (reads.append(a), of(*a))[1]
+    )
     log = ids(client)["log"]
     for path in (f"/logs/{log}", f"/logs/{log}/series?ch=heading", f"/logs/{log}/series?ch=yaw_rate&bins=50"):
         assert client.get(path).status_code == 200
@@ -232,7 +234,7 @@ def test_no_template_lets_text_through_as_markup():
 
 def test_what_others_wrote_is_as_they_wrote_it():
     served = static_files.contents()
-    manifest = (files("kempf.workbench.web") / "static" / "vendor" / "SHA256SUMS").read_text().split("\n")
+    manifest = (files("kempf.workbench") / "static" / "vendor" / "SHA256SUMS").read_text().split("\n")
     named = {line.split()[1]: line.split()[0] for line in manifest if line}
     assert {f"vendor/{name}" for name in named} >= {name for name in served if name.startswith("vendor/")}
     for name, (content, _) in served.items():

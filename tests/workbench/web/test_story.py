@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs.standing_model import PLAIN, Own
+from kempf.flows.jobs.standing_model import Own
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.report.build import make_report
 from tests.late import VESSEL, some_effects
@@ -208,7 +209,7 @@ def test_a_report_zooms_without_a_network_and_is_printed_with_its_pictures(
 ):
     file = tmp_path / "late.html"
     with some_effects():
-        report = make_report(Warehouse(str(copytree(late_diagnosed / "w", tmp_path / "w"))), VESSEL, PLAIN, Own())
+        report = make_report(Warehouse(str(copytree(late_diagnosed / "w", tmp_path / "w"))), VESSEL, ModelSpec(), Own())
     file.write_text(report.html, encoding="utf-8")
     size = {"width": width, "height": 900}
     tab = browser.new_context(viewport=size, color_scheme=scheme, offline=True).new_page()

@@ -12,11 +12,11 @@ from markupsafe import Markup
 from starlette.testclient import TestClient
 
 import kempf
+from kempf.workbench.documents.manoeuvres import logs_begin_alike
 from kempf.workbench.web import wording
 from kempf.workbench.web.draw.svg import drawing
 from kempf.workbench.web.pages import compare, diagnosis
 from kempf.workbench.web.pages.explain import sizes_of
-from kempf.workbench.web.pages.manoeuvre_names import logs_begin_alike
 from tests.workbench.web.test_pages import ids
 
 #: Errors that no page can come to: of commands alone, or before the pages are served.

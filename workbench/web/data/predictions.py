@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.flows.fleet.state import VesselState, fleet_state, responsible_code
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.leg_fit import by_name, shown_by_legs
+from kempf.flows.jobs.vessel_state import VesselState, fleet_state, responsible_code
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.whole_file import keep_newest, whole_file
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -101,7 +101,7 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
 
     folder = state / "predictions"
     where = comparison.where()
-    document = json.dumps({**comparison.show(), "where": where})
+    document = json.dumps({**comparison.as_json(), "where": where})
     columns: dict[str, NDArray[Any]] = {
         f"{run.name}/{name}": values for run in comparison.runs for name, values in run_series(run).items()
     }
@@ -109,9 +109,7 @@ def keep(state: Path, key: str, comparison: Comparison) -> None:
         columns |= {f"{name}/{MARK}{evidence}": inside for name, inside in by_run.items()}
     with whole_file(folder / f"{key}.npz") as passing, passing.open("wb") as file:
         np.savez(file, allow_pickle=False, document=np.frombuffer(document.encode(), dtype=np.uint8), **columns)
-    held = sorted(folder.glob("*.npz"), key=lambda path: (path.stat().st_mtime_ns, path.name))
-    for path in held[:-_MOST]:
-        path.unlink()
+    keep_newest(folder, "*.npz", _MOST)
 
 
 def kept_of(warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None) -> Asked:

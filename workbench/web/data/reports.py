@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kempf.schemas.errors import NotFound
 from kempf.warehouse.canonical import sha256
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.whole_file import keep_newest, whole_file
 from kempf.workbench.web.jobs.queue import DONE, Job
 
 #: reports kept: the ones made longest ago go first
@@ -18,9 +18,7 @@ def keep(state: Path, html: str) -> str:
     folder, key = state / "reports", sha256(html)[:24]
     with whole_file(folder / f"{key}.html") as passing:
         passing.write_text(html, encoding="utf-8")
-    held = sorted(folder.glob("*.html"), key=lambda path: (path.stat().st_mtime_ns, path.name))
-    for path in held[:-_MOST]:
-        path.unlink()
+    keep_newest(folder, "*.html", _MOST)
     return key
 
 

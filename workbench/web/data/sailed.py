@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-from kempf.flows.jobs.predict_request import Kind, PredictRequest, required
+from kempf.flows.jobs.predict_request import Kind, PredictRequest, Side, angles_of, required
 from kempf.schemas.errors import UsageError
-from kempf.workbench.web.numbers import number_of
+from kempf.workbench.web.form_numbers import number_of
 
 if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.prediction import Prediction
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
 #: Manoeuvres that can be predicted.
 MANOEUVRES: tuple[Kind, ...] = get_args(Kind)
 #: Sides of a turn, the usual one first.
-SIDES = ("starboard", "port")
+SIDES: tuple[Side, ...] = get_args(Side)
 #: ships of all models that are drawn one by one, and points of each
 _SHIPS, _POINTS = 24, 120
 
@@ -44,30 +43,9 @@ def request_of(fields: Mapping[str, Any]) -> PredictRequest:
         raise UsageError("side_unknown", f"{side[:40]!r} is no side.", "Choose starboard or port.")
     rudder, speed = number_of(fields["rudder"], "rudder"), number_of(fields["speed"], "speed")
     angles = angles_of(fields["angles"] or "20/20")
-    request = PredictRequest(cast(Kind, kind), fields["set"] or None, rudder, angles, cast(Any, side), speed)
+    request = PredictRequest(cast(Kind, kind), fields["set"] or None, rudder, angles, cast(Side, side), speed)
     required(request)
     return request
-
-
-def angles_of(text: str) -> tuple[float, float]:
-    """Return heading and rudder of a zigzag, deg.
-
-    Raises
-    ------
-    UsageError
-        ``angles_unreadable``.
-
-    Examples
-    --------
-    >>> angles_of("20/10")
-    (20.0, 10.0)
-    """
-    match = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,9})?)\s*/\s*(\d{1,3}(?:\.\d{1,9})?)\s*", text)
-    if match is None:
-        raise UsageError(
-            "angles_unreadable", f"{text[:60]!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
-        )
-    return float(match[1]), float(match[2])
 
 
 def curves_of(prediction: Prediction) -> dict[str, list[list[list[float]]]]:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from kempf.flows.process.progress import Figures
+from kempf.workbench.numbers import percent
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _PANEL, _LEFT, _RIGHT, _GAP = 640.0, 110.0, 76.0, 10.0, 14.0
@@ -31,9 +32,9 @@ def in_words(figures: Sequence[Figures]) -> str:
     first, last = figures[0], figures[-1]
     error = ""
     if last.error is not None:
-        error = f", error one step ahead {_percent(last.error)} %"
+        error = f", error one step ahead {percent(last.error)} %"
         if first is not last and first.error is not None:
-            error += f" ({_percent(first.error)} % at iteration {first.iteration})"
+            error += f" ({percent(first.error)} % at iteration {first.iteration})"
     return f"Iteration {last.iteration}: log-likelihood {last.log_likelihood:.1f}{error}."
 
 
@@ -60,10 +61,6 @@ def draw_climb(figures: Sequence[Figures]) -> Markup:
     ]
     title = "Log-likelihood and error one step ahead, iteration by iteration; a dot where a model is fitted"
     return drawing(_WIDTH, below + 6.0, title, *parts)
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g}"
 
 
 def _panel(

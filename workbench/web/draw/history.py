@@ -28,7 +28,7 @@ def draw_history(
     rows : sequence of mapping
         Of `kempf.warehouse.history.History.rows`.
     examined : sequence of mapping, optional
-        Of `kempf.workbench.documents.changes.Examined.show`: where a parameter moved its panel says so.
+        Of `kempf.workbench.documents.changes.Examined.as_json`: where a parameter moved its panel says so.
     noted : sequence of Note, optional
         A line where each says that something happened.
     """

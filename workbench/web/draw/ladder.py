@@ -8,6 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.rungs import effect_names
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
@@ -50,7 +51,7 @@ def draw_ladder(rungs: Sequence[Mapping[str, Any]]) -> Markup | None:
     parts.append(element("text", "error one leg ahead, % of the motion", x=_LEFT, y=height - 3.0, class_="label"))
     for k, (rung, by_sample) in enumerate(zip(rungs, errors, strict=True)):
         y = 24.0 + _ROW * (k + 0.5)
-        name = _first(rung) if rung["added"] is None else f"+ {rung['added'].replace('_', ' ')}"
+        name = _first(rung) if rung["added"] is None else f"+ {as_words(rung['added'])}"
         parts.append(element("text", name, x=_LEFT - 10.0, y=y + 4.0, text_anchor="end", class_="label strong"))
         for place, (sample, words, form) in enumerate(_SAMPLES):
             for error in by_sample[sample]:
@@ -79,13 +80,7 @@ def draw_ladder(rungs: Sequence[Mapping[str, Any]]) -> Markup | None:
 def _first(rung: Mapping[str, Any]) -> str:
     """Return what the first model is called: a diagnosis may begin from one that has effects."""
     has = effect_names(rung)
-    return (
-        f"model with {len(has)} effects"
-        if len(has) > 1
-        else f"with {has[0].replace('_', ' ')}"
-        if has
-        else "plain model"
-    )
+    return f"model with {len(has)} effects" if len(has) > 1 else f"with {as_words(has[0])}" if has else "plain model"
 
 
 def _x(error: float, most: float) -> float:

@@ -8,8 +8,8 @@ import numpy as np
 from markupsafe import Markup
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
-from kempf.workbench.web.data.signs import STARBOARD
-from kempf.workbench.web.data.turns import within_a_turn
+from kempf.workbench.charts.signs import STARBOARD
+from kempf.workbench.charts.turns import within_a_turn
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import drawing, element

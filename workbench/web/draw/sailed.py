@@ -8,7 +8,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from kempf.workbench.web.data.signs import STARBOARD
+from kempf.workbench.charts.signs import STARBOARD
 from kempf.workbench.web.draw.frame import BOTTOM, LEFT, RIGHT, TOP, Frame
 from kempf.workbench.web.draw.svg import drawing, element
 

@@ -10,6 +10,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.schemas.enumeration import as_words
 from kempf.workbench.web.data.predictions import UNITS
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import element
@@ -64,7 +65,7 @@ def _strip(columns: Mapping[str, Float], left: Float, reach: float, marked: Mask
     size = float(np.sqrt(np.mean(left[np.isfinite(left)] ** 2))) if at.size else 0.0
     return element(
         "svg",
-        element("title", f"What is left of {channel.replace('_', ' ')}: rms {size:.3g}"),
+        element("title", f"What is left of {as_words(channel)}: rms {size:.3g}"),
         *(() if marked is None else shades(time_s, marked, 0.0, scale, 0.0, _HEIGHT)),
         element("line", x1=0.0, x2=_WIDTH, y1=middle, y2=middle, class_="grid"),
         element("path", d=path, fill="none", class_="line-left"),

@@ -9,10 +9,10 @@ import numpy as np
 from markupsafe import Markup
 
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.positions import plane
 from kempf.pipeline.channels.series import Float
 from kempf.workbench.web.draw.svg import drawing, element
 
-_RADIUS_M = 6_371_000.0
 _WIDTH, _HEIGHT, _EDGE = 640.0, 420.0, 24.0
 #: points of a line that a figure of this size can tell apart
 _POINTS = 1500
@@ -29,11 +29,9 @@ def draw_track(channels: Instruments, manoeuvres: Sequence[tuple[int, int]]) -> 
     latitude, longitude = channels.get("latitude"), channels.get("longitude")
     if latitude is None or longitude is None or len(latitude) < 2 or len(latitude) != len(longitude):
         return None
-    middle = float(np.median(latitude.value))
-    north = _RADIUS_M * (latitude.value - middle)
     # the shorter way round, so that a track across 180 deg holds together
     turn = (longitude.value - longitude.value[0] + np.pi) % (2.0 * np.pi) - np.pi
-    east = _RADIUS_M * np.cos(middle) * turn
+    north, east = plane(latitude.value, turn)
     scale = min(
         (_WIDTH - 2 * _EDGE) / max(float(np.ptp(east)), 1.0), (_HEIGHT - 2 * _EDGE) / max(float(np.ptp(north)), 1.0)
     )

@@ -17,9 +17,9 @@ from pathlib import Path
 
 from kempf.flows.process.wrap_error import wrapped
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.web.jobs.kinds import KINDS
+from kempf.workbench.web.jobs.job_progress import JobProgress
+from kempf.workbench.web.jobs.kinds import KINDS, Work
 from kempf.workbench.web.jobs.queue import RUNNING, Job, Queue
-from kempf.workbench.web.jobs.ticking import Ticking
 
 _PAUSE_S = 0.1
 #: what a fit needs, and takes seconds to load
@@ -67,9 +67,9 @@ def _work(state: Path, warehouse: Warehouse, job: Job) -> None:
     queue, engine = Queue(state / "jobs.sqlite"), os.getppid()
     # a job outlives no engine: the next one begins it anew, and two would do it at once
     threading.Thread(target=_end_with, args=(engine,), daemon=True).start()
-    progress = Ticking(queue, job.id)
+    progress = JobProgress(queue, job.id)
     try:
-        result = KINDS[job.kind].work(warehouse, state, job.arguments, progress)
+        result = KINDS[job.kind].do(Work(warehouse, state, job.arguments, progress))
         progress.write()
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
         failure = wrapped(error)

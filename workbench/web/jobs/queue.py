@@ -54,7 +54,7 @@ class Job:
     #: The error's JSON where it failed.
     error: Mapping[str, Any] | None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return the job as JSON content."""
         return dict(vars(self))
 
@@ -70,7 +70,7 @@ class Tick:
     #: Of an iteration of a fit; None for anything else.
     figures: Figures | None = None
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return asdict(self)
 
@@ -216,7 +216,7 @@ class Queue:
 
     def fail(self, name: str, error: KempfError) -> None:
         """Let a running job have failed."""
-        self._leave(name, FAILED, error=json.dumps(error.to_json()["error"], default=str))
+        self._leave(name, FAILED, error=json.dumps(error.as_json()["error"], default=str))
 
     def cancel(self, name: str) -> Job:
         """Let a job that waits or runs be cancelled.

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, DONE, Job
 from kempf.workbench.web.pages.job import settled
@@ -37,8 +37,8 @@ class Answer:
         return self.job if self.job is not None and self.job.state in ACTIVE else None
 
 
-def answer(desk: Desk, kind: str, vessel: str, fields: Mapping[str, str]) -> Answer:
+def answer(app_state: AppState, kind: str, vessel: str, fields: Mapping[str, str]) -> Answer:
     """Return the answer to the fields of an address; errors are those of `kempf.workbench.web.pages.job.settled`."""
     form = {name: fields.get(name, "") for name in KINDS[kind].fields}
-    arguments, digest = settled(desk, kind, vessel, form)
-    return Answer(arguments, desk.queue.known(kind, arguments, digest))
+    arguments, digest = settled(app_state, kind, vessel, form)
+    return Answer(arguments, app_state.queue.known(kind, arguments, digest))

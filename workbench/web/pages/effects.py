@@ -7,7 +7,7 @@ from typing import Any
 from kempf.flows.jobs.standing_model import current_effects
 from kempf.schemas.effects import catalogue, get
 from kempf.warehouse import diagnoses
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page
 
 
@@ -29,13 +29,13 @@ def gather_list() -> Page:
     return Page("effects.html", "Effects", {"groups": groups})
 
 
-def gather(desk: Desk, name: str) -> Page:
+def gather(app_state: AppState, name: str) -> Page:
     """Return the page of an effect."""
     effect = get(name)
     named = sorted(
-        vessel for vessel, diagnosis in diagnoses.newest(desk.warehouse).items() if name in diagnosis.effects
+        vessel for vessel, diagnosis in diagnoses.newest(app_state.warehouse).items() if name in diagnosis.effects
     )
-    by_now = current_effects(desk.warehouse)
+    by_now = current_effects(app_state.warehouse)
     content = {
         "effect": effect,
         "lacking": [vessel for vessel in named if name not in by_now.get(vessel, ())],

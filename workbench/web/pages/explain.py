@@ -10,17 +10,17 @@ from kempf.schemas.effects import catalogue
 from kempf.warehouse import vessels
 from kempf.workbench.rungs import sized
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
+def document(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf explain --vessel NAME --from T --to T --json` prints, where it was made; else None."""
-    return answer(desk, "explain", vessel, fields).document
+    return answer(app_state, "explain", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
+def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a stretch.
 
     Parameters
@@ -34,9 +34,9 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     UsageError
         ``instant_unreadable``, ``window_empty``.
     """
-    reply = answer(desk, "explain", vessel, fields)
+    reply = answer(app_state, "explain", vessel, fields)
     effects = reply.document["effects"] if reply.document is not None else []
-    length_m = vessels.profiles(desk.warehouse)[vessel].length_m
+    length_m = vessels.profiles(app_state.warehouse)[vessel].length_m
     content = {
         "vessel": vessel,
         "asked": {

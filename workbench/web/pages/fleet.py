@@ -7,37 +7,37 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from kempf.flows.jobs.vessel_report import FLOW
 from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.vessel_counts import counted, vessel_counts
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page
 
-FLOW = "reprocess"
 #: vessels, and files in quarantine, that a page shows
 MOST, MOST_FILES = 200, 20
 _OUTDATED = "her models rest on manoeuvres that count no longer"
 
 
-def document(desk: Desk) -> list[dict[str, Any]]:
+def document(app_state: AppState) -> list[dict[str, Any]]:
     """Return what `kempf vessels list --json` prints."""
-    return vessel_counts(desk.warehouse)
+    return vessel_counts(app_state.warehouse)
 
 
-def gather(desk: Desk) -> Page:
+def gather(app_state: AppState) -> Page:
     """Return the page of the fleet, vessels that need somebody first."""
-    known = diagnoses.by_vessel(desk.warehouse)
-    messages = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
-    last = {row["vessel"]: row for row in views.run_history(desk.warehouse).rows(named=True)}
+    known = diagnoses.by_vessel(app_state.warehouse)
+    messages = {run.vessel: run.message for run in runs.all_runs(app_state.warehouse, FLOW) if run.vessel is not None}
+    last = {row["vessel"]: row for row in views.run_history(app_state.warehouse).rows(named=True)}
     rows = []
-    for vessel in counted(desk.warehouse):
+    for vessel in counted(app_state.warehouse):
         message, ran = messages.get(vessel.vessel, {}), last.get(vessel.vessel)
         every = known.get(vessel.vessel, [])
         rows.append(
             {
-                **vessel.show(),
+                **vessel.as_json(),
                 "fitted": vessel.effects,
                 "diagnosis": every[-1] if every else None,
                 "since": {effect: _since(every, effect) for effect in every[-1].effects} if every else {},
@@ -50,7 +50,7 @@ def gather(desk: Desk) -> Page:
             }
         )
     rows.sort(key=lambda row: (-len(row["failures"]), -len(row["findings"]), row["vessel"]))
-    quarantined = inbox.quarantined(desk.warehouse)
+    quarantined = inbox.quarantined(app_state.warehouse)
     content = {
         "rows": rows[:MOST],
         "count": len(rows),

@@ -6,18 +6,18 @@ from collections.abc import Callable, Mapping
 from itertools import groupby
 from typing import Any
 
-from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.standing_model import require_current
+from kempf.flows.jobs.vessel_state import fleet_state
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import segments, vessels
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data.predictions import key_of
 from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
-from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, DONE, FAILED, QUEUED, Job
@@ -34,19 +34,19 @@ _MOST_REASON = 2000
 _MOST = 200
 
 
-def document(desk: Desk, name: str, after: int = 0) -> dict[str, Any]:
+def document(app_state: AppState, name: str, after: int = 0) -> dict[str, Any]:
     """Return a job and how far it was, from a tick on that is not among them."""
-    job = desk.queue.get(name)
-    shown = {**job.show(), "ticks": [tick.show() for tick in desk.queue.ticks(name, after)]}
+    job = app_state.queue.get(name)
+    shown = {**job.as_json(), "ticks": [tick.as_json() for tick in app_state.queue.ticks(name, after)]}
     if shown["result"] is not None:
         shown["result"] = {"to": f"/jobs/{job.id}", **shown["result"]}
     return shown
 
 
-def gather(desk: Desk, name: str) -> Page:
+def gather(app_state: AppState, name: str) -> Page:
     """Return the page of a job."""
-    job = desk.queue.get(name)
-    ticks = desk.queue.ticks(name)
+    job = app_state.queue.get(name)
+    ticks = app_state.queue.ticks(name)
     # one piece of work ticks many times
     pieces = [piece for piece, _ in groupby(tick.what for tick in ticks)]
     if job.state == FAILED and pieces[-1:] == ["done"]:  # with every file looked at, none of which went in
@@ -58,23 +58,23 @@ def gather(desk: Desk, name: str) -> Page:
         **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
         **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
     }
-    waiting = [one.id for one in desk.queue.active()]
+    waiting = [one.id for one in app_state.queue.active()]
     content["before"] = waiting.index(job.id) if job.state == QUEUED and job.id in waiting else 0
     vessel = job.arguments["vessel"]
     if job.kind == "ingest" and job.result is not None:
-        content["names"] = _names_of_found(desk, job.result["outcomes"])
+        content["names"] = _names_of_found(app_state, job.result["outcomes"])
     return Page(
         "job.html", f"{KINDS[job.kind].title}: {vessel}", content, (("Jobs", "/jobs"), (vessel, of_vessel(vessel)))
     )
 
 
-def _names_of_found(desk: Desk, outcomes: list[dict[str, Any]]) -> dict[str, str]:
+def _names_of_found(app_state: AppState, outcomes: list[dict[str, Any]]) -> dict[str, str]:
     """Return what the manoeuvres that a job found are called, by id; of those that are no more there is none."""
     ingests = [one["ingest_id"] for one in outcomes if one.get("ingest_id")]
-    return {one.segment_id: kind_and_side(one) for one in segments.of_ingests(desk.warehouse, ingests)}
+    return {one.segment_id: kind_and_side(one) for one in segments.of_ingests(app_state.warehouse, ingests)}
 
 
-def ask(desk: Desk, form: Mapping[str, str]) -> Job:
+def ask(app_state: AppState, form: Mapping[str, str]) -> Job:
     """Put what a form asks for into the queue.
 
     Raises
@@ -88,10 +88,10 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
     kind, vessel = form.get("kind", ""), form.get("vessel", "")
     if kind not in KINDS or kind == "ingest":
         raise UsageError("job_unknown", f"There is no job {kind[:40]!r}.", f"Ask for one of {', '.join(KINDS)}.")
-    vessels.require(desk.warehouse, vessel)
-    require_current(desk.warehouse, vessel, form.get("standing"))
-    arguments, digest = settled(desk, kind, vessel, form)
-    return desk.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
+    vessels.require(app_state.warehouse, vessel)
+    require_current(app_state.warehouse, vessel, form.get("standing"))
+    arguments, digest = settled(app_state, kind, vessel, form)
+    return app_state.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
 
 
 def place_of(job: Job) -> str:
@@ -100,67 +100,67 @@ def place_of(job: Job) -> str:
     return str(made["to"]) if "to" in made and "document" in made else f"/jobs/{job.id}"
 
 
-def settled(desk: Desk, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
+def settled(app_state: AppState, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
     """Return the arguments of a job, with what the form leaves open, and the digest of what it works on."""
     arguments: Arguments = {"vessel": vessel, **{name: form.get(name, "") for name in KINDS[kind].fields}}
     settle = _SETTLE.get(kind)
-    own = settle(desk, arguments) if settle is not None else None
-    return arguments, own or fleet_state(desk.warehouse, [vessel])[vessel].digest
+    own = settle(app_state, arguments) if settle is not None else None
+    return arguments, own or fleet_state(app_state.warehouse, [vessel])[vessel].digest
 
 
-def _predict(desk: Desk, arguments: Arguments) -> str:
+def _predict(app_state: AppState, arguments: Arguments) -> str:
     arguments["horizon"] = horizon_of(arguments["horizon"]).name
-    _name_the_set(desk, arguments)
+    _name_the_set(app_state, arguments)
     # a set that came since moves no prediction with another one
-    state = fleet_state(desk.warehouse, [arguments["vessel"]])[arguments["vessel"]]
+    state = fleet_state(app_state.warehouse, [arguments["vessel"]])[arguments["vessel"]]
     arguments["key"] = key_of(state, arguments["set"], arguments["horizon"])
     return str(arguments["key"])
 
 
-def _sail(desk: Desk, arguments: Arguments) -> None:
-    _name_the_set(desk, arguments)
+def _sail(app_state: AppState, arguments: Arguments) -> None:
+    _name_the_set(app_state, arguments)
     arguments["manoeuvre"] = arguments["manoeuvre"] or MANOEUVRES[0]
     arguments["side"] = arguments["side"] or SIDES[0]
     request_of(arguments)  # what cannot be sailed is said at once
 
 
-def _name_the_set(desk: Desk, arguments: Arguments) -> None:
+def _name_the_set(app_state: AppState, arguments: Arguments) -> None:
     name = arguments["set"] or None
-    arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], name)[0].parameter_set_id
+    arguments["set"] = chosen_set(app_state.warehouse, arguments["vessel"], name)[0].parameter_set_id
 
 
-def _known_set(desk: Desk, arguments: Arguments) -> None:
+def _known_set(app_state: AppState, arguments: Arguments) -> None:
     if arguments["set"]:
-        _name_the_set(desk, arguments)
+        _name_the_set(app_state, arguments)
 
 
-def _formula(desk: Desk, arguments: Arguments) -> None:
+def _formula(app_state: AppState, arguments: Arguments) -> None:
     from kempf.flows.jobs.try_formula import formula_of_ones_own
 
     arguments["name"] = arguments["name"].strip() or "own"
     formula_of_ones_own(arguments["name"], arguments["formula"])
 
 
-def _add(desk: Desk, arguments: Arguments) -> None:
+def _add(app_state: AppState, arguments: Arguments) -> None:
     if not arguments["formula"]:
         get(arguments["effect"])
 
 
-def _stretch(desk: Desk, arguments: Arguments) -> None:
-    _name_the_set(desk, arguments)
+def _stretch(app_state: AppState, arguments: Arguments) -> None:
+    _name_the_set(app_state, arguments)
     begin, end = instant(arguments.pop("from")), instant(arguments.pop("to"))
     if end <= begin:
         raise UsageError("window_empty", "The stretch ends before it begins.", "Give a later end.")
     arguments["window_utc_ns"] = [begin, end]
 
 
-def _then(desk: Desk, arguments: Arguments) -> None:
+def _then(app_state: AppState, arguments: Arguments) -> None:
     arguments["as_of"] = arguments["as_of"].strip()
     if arguments["as_of"]:
         end_of(arguments["as_of"], "as_of")
 
 
-def _correction(desk: Desk, arguments: Arguments) -> None:
+def _correction(app_state: AppState, arguments: Arguments) -> None:
     if arguments["action"] not in _ACTIONS:
         raise UsageError(
             "action_unknown",
@@ -175,7 +175,7 @@ def _correction(desk: Desk, arguments: Arguments) -> None:
 
 
 #: What a job needs looked at before it waits; it may return a digest of its own.
-_SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
+_SETTLE: Mapping[str, Callable[[AppState, Arguments], str | None]] = {
     "predict": _predict,
     "explain": _stretch,
     "what_if": _name_the_set,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, Job
 from kempf.workbench.web.pages.page import Page
@@ -13,10 +13,10 @@ from kempf.workbench.web.pages.page import Page
 _MOST = 40
 
 
-def gather(desk: Desk) -> Page:
+def gather(app_state: AppState) -> Page:
     """Return the page of the jobs."""
-    over = [job for job in desk.queue.all(_MOST) if job.state not in ACTIVE]
-    content = {"active": rows(desk.queue.active()), "over": rows(over)}
+    over = [job for job in app_state.queue.all(_MOST) if job.state not in ACTIVE]
+    content = {"active": rows(app_state.queue.active()), "over": rows(over)}
     return Page("jobs.html", "Jobs", content)
 
 

@@ -8,23 +8,23 @@ from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.workbench.documents.ladder import ladder_document
 from kempf.workbench.rungs import compared, remarks
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.ladder import draw_ladder
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+def document(app_state: AppState, vessel: str) -> list[dict[str, Any]]:
     """Return what `kempf ladder --vessel NAME --json` prints."""
-    return ladder_document(desk.warehouse, vessel)
+    return ladder_document(app_state.warehouse, vessel)
 
 
-def gather(desk: Desk, vessel: str) -> Page:
+def gather(app_state: AppState, vessel: str) -> Page:
     """Return the page of a vessel's ladder."""
-    rungs = document(desk, vessel)
+    rungs = document(app_state, vessel)
     beside = compared(rungs)
     content = {
         "vessel": vessel,
-        "stale": said_of_vessel(desk.warehouse, vessel),
+        "stale": said_of_vessel(app_state.warehouse, vessel),
         "rungs": list(zip(rungs, beside, strict=True)),
         "drawn": draw_ladder(rungs),
         "remarks": remarks(beside),

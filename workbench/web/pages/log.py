@@ -9,7 +9,7 @@ from kempf.warehouse import logs, lost, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.logs import log_document
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.track import draw_track
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.pages.series import offered
@@ -17,28 +17,30 @@ from kempf.workbench.web.pages.spans import span_of, spans_of_lost, spans_of_not
 from kempf.workbench.web.window import window
 
 
-def document(desk: Desk, log_id: str) -> dict[str, Any]:
+def document(app_state: AppState, log_id: str) -> dict[str, Any]:
     """Return what `kempf logs show ID --json` prints."""
-    return log_document(desk.warehouse, logs.by_prefix(desk.warehouse, log_id))
+    return log_document(app_state.warehouse, logs.by_prefix(app_state.warehouse, log_id))
 
 
-def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None) -> Page:
+def gather(app_state: AppState, log_id: str, asked_from: str | None, asked_to: str | None) -> Page:
     """Return the page of a log."""
-    row = logs.by_prefix(desk.warehouse, log_id)
+    row = logs.by_prefix(app_state.warehouse, log_id)
     begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
-    channels = desk.channels.of(row.ingest_id)
+    channels = app_state.channels.of(row.ingest_id)
     manoeuvres = [
-        manoeuvre for manoeuvre in segments.found_in(desk.warehouse, row.vessel) if manoeuvre.ingest_id == row.ingest_id
+        manoeuvre
+        for manoeuvre in segments.found_in(app_state.warehouse, row.vessel)
+        if manoeuvre.ingest_id == row.ingest_id
     ]
-    gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
-    vessel_notes = notes.of_vessel(desk.warehouse, row.vessel)
-    shown = log_document(desk.warehouse, row)
+    gone = lost.of_ingests(app_state.warehouse, [row.ingest_id]).get(row.ingest_id, ())
+    vessel_notes = notes.of_vessel(app_state.warehouse, row.vessel)
+    shown = log_document(app_state.warehouse, row)
     content = {
         "log": shown,
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
-        "remarks": [note.show() for note in vessel_notes if note.subject_id == row.log_id],
-        "manoeuvres": [manoeuvre.show(row.file_name) for manoeuvre in manoeuvres],
+        "remarks": [note.as_json() for note in vessel_notes if note.subject_id == row.log_id],
+        "manoeuvres": [manoeuvre.as_json(row.file_name) for manoeuvre in manoeuvres],
         "spans": [
             *(span_of(manoeuvre) for manoeuvre in manoeuvres),
             *spans_of_lost(gone, row.start_utc_ns, row.end_utc_ns),

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from kempf.warehouse import logs, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.documents.manoeuvres import logs_begin_alike
 
 
 def kind_and_side(segment: Segment) -> str:
@@ -32,15 +31,3 @@ def names_of(warehouse: Warehouse, vessel: str, *, when: bool = True) -> dict[st
         + (f", {files[one.ingest_id]}" if alike and one.ingest_id in files else "")
         for one in found
     }
-
-
-def logs_begin_alike(manoeuvres: Iterable[tuple[str, str]]) -> bool:
-    """Return whether manoeuvres of several logs begin in the same minute, as where a logger has no calendar.
-
-    Parameters
-    ----------
-    manoeuvres : iterable of (str, str)
-        Start, ISO 8601, and log of each.
-    """
-    log_at: dict[str, str] = {}
-    return any(log_at.setdefault(start[:16], log) != log for start, log in manoeuvres)

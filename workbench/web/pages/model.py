@@ -9,10 +9,11 @@ import numpy as np
 
 from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.pipeline.compare.evidence import SAMPLES, Evidence, evidence_in
+from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import NotFound
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
-from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.draw.strip import Strips, draw_strips
 from kempf.workbench.web.pages.manoeuvre_names import names_of
@@ -24,13 +25,13 @@ _MOST, _MOST_STRIPS = 12, 16
 _CHANNEL = "yaw_rate"
 
 
-def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
+def document(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf compare --where --json` prints, where it is kept; else None."""
-    prediction = kept_of(desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h")).prediction
+    prediction = kept_of(app_state.warehouse, app_state.folder, vessel, fields.get("set"), fields.get("h")).prediction
     return None if prediction is None else prediction.document
 
 
-def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
+def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a vessel's model, one that is named or her current one, with one run drawn.
 
     Parameters
@@ -45,12 +46,12 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         ``no_run``, ``no_parameter_set``, ``no_evidence``.
     """
     set_id, horizon, prediction, by_legs = kept_of(
-        desk.warehouse, desk.state, vessel, fields.get("set"), fields.get("h")
+        app_state.warehouse, app_state.folder, vessel, fields.get("set"), fields.get("h")
     )
     prediction_before: KeptPrediction | None = None
     content: dict[str, Any] = {
         "vessel": vessel,
-        "stale": said_of_vessel(desk.warehouse, vessel),
+        "stale": said_of_vessel(app_state.warehouse, vessel),
         "set_id": set_id,
         "horizon": horizon,
         "horizons": [pair for pair in HORIZONS if pair[0] != "legs" or by_legs],
@@ -58,7 +59,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         "beside": None,
     }
     if beside := fields.get("beside"):
-        other_id, _, prediction_before, _ = kept_of(desk.warehouse, desk.state, vessel, beside, horizon)
+        other_id, _, prediction_before, _ = kept_of(app_state.warehouse, app_state.folder, vessel, beside, horizon)
         content |= {"beside": other_id, "before": None if prediction_before is None else prediction_before.document}
     if prediction is not None:
         runs = sorted(prediction.document["runs"], key=lambda run: (not run["held_out"], run["start"]))
@@ -69,10 +70,10 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         summaries = [prediction.document["summary"][key] for key, _ in SAMPLES if prediction.document["summary"][key]]
         units = {channel: one["unit"] for summary in summaries for channel, one in summary["rms_display"].items()}
         content |= {
-            "names": names_of(desk.warehouse, vessel),
-            "short": names_of(desk.warehouse, vessel, when=False),
+            "names": names_of(app_state.warehouse, vessel),
+            "short": names_of(app_state.warehouse, vessel, when=False),
             "rms_channels": list(units),
-            "rms_units": [(channel.replace("_", " "), unit) for channel, unit in units.items()],
+            "rms_units": [(as_words(channel), unit) for channel, unit in units.items()],
             "runs": runs,
             "shown": shown,
             "drawn": draw_run(

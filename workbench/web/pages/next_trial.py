@@ -7,17 +7,17 @@ from typing import Any
 
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
+def document(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf next-trial --vessel NAME --json` prints, where it was made; else None."""
-    return answer(desk, "next_trial", vessel, fields).document
+    return answer(app_state, "next_trial", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
+def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of the next trial.
 
     Parameters
@@ -25,8 +25,8 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     fields : mapping of str to str
         ``set``, by default the current one; ``parameter``, whose interval is to be halved.
     """
-    parameter_set = chosen_set(desk.warehouse, vessel, fields.get("set") or None)[0]
-    reply = answer(desk, "next_trial", vessel, {**fields, "set": parameter_set.parameter_set_id})
+    parameter_set = chosen_set(app_state.warehouse, vessel, fields.get("set") or None)[0]
+    reply = answer(app_state, "next_trial", vessel, {**fields, "set": parameter_set.parameter_set_id})
     content = {
         "vessel": vessel,
         "asked": {name: reply.arguments[name] for name in ("set", "parameter")},

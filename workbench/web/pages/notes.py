@@ -8,8 +8,8 @@ from kempf.flows.jobs.subject_of_note import subject_of
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import notes
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.numbers import number_of
+from kempf.workbench.web.app_state import AppState
+from kempf.workbench.web.form_numbers import number_of
 from kempf.workbench.web.window import instant
 
 #: letters that a note may have
@@ -17,7 +17,7 @@ MOST = 2000
 _PAGES = {"log": "/logs/", "segment": "/segments/", "set": "/sets/"}
 
 
-def write(desk: Desk, form: Mapping[str, str]) -> str:
+def write(app_state: AppState, form: Mapping[str, str]) -> str:
     """Store a note, and return the address of what it is on.
 
     Parameters
@@ -36,10 +36,10 @@ def write(desk: Desk, form: Mapping[str, str]) -> str:
             "note_too_long", f"The note has {len(text)} letters; at most {MOST} are kept.", "Write it shorter."
         )
     named = (form.get(name) or None for name in ("vessel", "log", "segment", "set"))
-    whose, subject, subject_id = subject_of(desk.warehouse, *named)
+    whose, subject, subject_id = subject_of(app_state.warehouse, *named)
     at = form.get("at", "").strip()
     notes.add(
-        desk.warehouse,
+        app_state.warehouse,
         whose,
         subject,
         subject_id,

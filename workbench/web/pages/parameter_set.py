@@ -9,24 +9,24 @@ from kempf.flows.jobs.leg_fit import by_name
 from kempf.flows.jobs.out_of_date import said_of_sets
 from kempf.warehouse import history
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.correlation import draw_correlation
 from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, set_id: str) -> dict[str, Any]:
+def document(app_state: AppState, set_id: str) -> dict[str, Any]:
     """Return what `kempf params show ID --json` prints."""
-    return named_set(desk.warehouse, set_id, None).show()
+    return named_set(app_state.warehouse, set_id, None).as_json()
 
 
-def gather(desk: Desk, set_id: str) -> Page:
+def gather(app_state: AppState, set_id: str) -> Page:
     """Return the page of a parameter set."""
-    parameter_set = named_set(desk.warehouse, set_id, None)
+    parameter_set = named_set(app_state.warehouse, set_id, None)
     unseen = parameter_set.unseen
     content = {
-        "one": parameter_set.show(),
-        "names": names_of(desk.warehouse, parameter_set.vessel),
+        "one": parameter_set.as_json(),
+        "names": names_of(app_state.warehouse, parameter_set.vessel),
         "fitted": [name for name in parameter_set.segment_ids if name not in unseen],
         "held_out": list(parameter_set.convergence.get("held_out") or ()),
         "by_legs": by_name(parameter_set),
@@ -36,8 +36,8 @@ def gather(desk: Desk, set_id: str) -> Page:
             ("Discrete, eq. (17)", parameter_set.discrete),
         ),
         "converged": bool(parameter_set.convergence.get("converged")),
-        "standing": parameter_set.parameter_set_id in set(history.standing(desk.warehouse, parameter_set.vessel)),
-        "stale": said_of_sets(desk.warehouse, [parameter_set]),
+        "standing": parameter_set.parameter_set_id in set(history.standing(app_state.warehouse, parameter_set.vessel)),
+        "stale": said_of_sets(app_state.warehouse, [parameter_set]),
         "correlation": draw_correlation(parameter_set.covariance_names, parameter_set.covariance),
     }
     return Page(

@@ -8,20 +8,20 @@ from typing import Any
 from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data.sailed import MANOEUVRES
-from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.sailed import draw_sailed
 from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
+def document(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf predict MANOEUVRE --vessel NAME --compare --json` prints, where it was made; else None."""
-    return answer(desk, "sail", vessel, fields).document
+    return answer(app_state, "sail", vessel, fields).document
 
 
-def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
+def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a predicted manoeuvre.
 
     Parameters
@@ -29,10 +29,10 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     fields : mapping of str to str
         Fields of `kempf.workbench.web.data.sailed.request_of`, any of them; the errors are its.
     """
-    reply = answer(desk, "sail", vessel, fields)
+    reply = answer(app_state, "sail", vessel, fields)
     content: dict[str, Any] = {
         "vessel": vessel,
-        "stale": said_of_vessel(desk.warehouse, vessel),
+        "stale": said_of_vessel(app_state.warehouse, vessel),
         "asked": reply.arguments,
         "manoeuvres": MANOEUVRES,
         "made": reply.document,
@@ -42,7 +42,7 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
         prediction = reply.made["document"]
         content |= {
             "drawn": draw_sailed(prediction["manoeuvre"], reply.made["curves"]),
-            "names": names_of(desk.warehouse, vessel),
+            "names": names_of(app_state.warehouse, vessel),
             "rows": list(_rows(prediction)),
             "measured": list(_measured(prediction)),
             "last_turn": LAST_TURN if prediction["manoeuvre"]["kind"] == "turning-circle" else None,

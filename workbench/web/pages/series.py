@@ -13,26 +13,26 @@ from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import logs, segments
-from kempf.workbench.web.data.bins import Shown, reduced
-from kempf.workbench.web.data.frames import encoded
+from kempf.workbench.charts.bins import Shown, reduced
+from kempf.workbench.charts.channels import LATERAL, entry
+from kempf.workbench.charts.frames import encoded
+from kempf.workbench.charts.turns import within_a_turn
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data.predictions import UNITS, kept_of
-from kempf.workbench.web.data.signs import SIGNS
-from kempf.workbench.web.data.turns import within_a_turn
-from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.window import window
 
 #: stretches that a chart may tell apart, channels that an answer may have
 MOST_BINS, MOST_CHANNELS = 1500, 12
 #: those that a page begins with, as far as the log has them
 FIRST = ("rudder_angle", "rudder_order", "heading", "yaw_rate", "speed_through_water", "speed_over_ground")
-#: what a model predicts and no log holds
-LATERAL = "lateral_speed"
 #: in a track and not in a chart
 _PLACES = ("latitude", "longitude")
 
 
-def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_to: str | None, bins: int) -> bytes:
-    """Return channels of a log over a window; see `kempf.workbench.web.data.frames`.
+def frame(
+    app_state: AppState, log_id: str, channels: str, asked_from: str | None, asked_to: str | None, bins: int
+) -> bytes:
+    """Return channels of a log over a window; see `kempf.workbench.charts.frames`.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_
     UsageError
         ``channel_unknown``, ``too_many_channels``, ``instant_unreadable``, ``window_empty``.
     """
-    row = logs.by_prefix(desk.warehouse, log_id)
+    row = logs.by_prefix(app_state.warehouse, log_id)
     begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
-    instruments = desk.channels.of(row.ingest_id)
+    instruments = app_state.channels.of(row.ingest_id)
     names = list(dict.fromkeys(channels.split(",")))
     if len(names) > MOST_CHANNELS:
         raise UsageError(
@@ -71,7 +71,7 @@ def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_
     )
 
 
-def predicted_frame(desk: Desk, segment_id: str, fields: Mapping[str, str], bins: int) -> bytes:
+def predicted_frame(app_state: AppState, segment_id: str, fields: Mapping[str, str], bins: int) -> bytes:
     """Return what a kept prediction says of a manoeuvre over a window, as ``channel:predicted``.
 
     With it the lateral speed as it was measured, which no log holds (eq. (18) of the paper).
@@ -88,11 +88,13 @@ def predicted_frame(desk: Desk, segment_id: str, fields: Mapping[str, str], bins
     UsageError
         ``instant_unreadable``, ``window_empty``.
     """
-    segment = segments.by_prefix(desk.warehouse, segment_id)
-    prediction = kept_of(desk.warehouse, desk.state, segment.vessel, fields.get("set"), fields.get("h")).prediction
+    segment = segments.by_prefix(app_state.warehouse, segment_id)
+    prediction = kept_of(
+        app_state.warehouse, app_state.folder, segment.vessel, fields.get("set"), fields.get("h")
+    ).prediction
     if prediction is None or segment.segment_id not in prediction.columns:
         raise NotFound("no_prediction", "This manoeuvre is not predicted.", "Predict on the model's page.")
-    row = logs.of_ingest(desk.warehouse, segment.ingest_id)
+    row = logs.of_ingest(app_state.warehouse, segment.ingest_id)
     begin, end = window(fields.get("from"), fields.get("to"), row.start_utc_ns, row.end_utc_ns)
     few, columns = max(1, min(bins, MOST_BINS)), prediction.series(segment.segment_id)
     names = {LATERAL: f"{LATERAL}_{UNITS[LATERAL]}"}
@@ -116,17 +118,3 @@ def offered(instruments: Instruments) -> list[dict[str, Any]]:
     names = [name for name in FIRST if name in instruments.series]
     names += [name for name in CHANNELS if name in instruments.series and name not in (*FIRST, *_PLACES)]
     return [entry(name, instruments.sources[name], shown=name in FIRST) for name in names]
-
-
-def entry(name: str, source: str, *, shown: bool) -> dict[str, Any]:
-    """Return a channel as a chart offers it."""
-    channel = CHANNELS[name]
-    sign = SIGNS.get(name, "")
-    return {"name": name, "unit": channel.unit, "sign": sign, "words": channel.words, "source": source, "shown": shown}
-
-
-def derived() -> dict[str, Any]:
-    """Return the lateral speed as a channel that a chart can show beside those of a log."""
-    words = "lateral speed through the water from GNSS and heading, eq. (18) of the paper"
-    own = {"name": LATERAL, "unit": "m/s", "sign": SIGNS[LATERAL], "words": words, "source": "GNSS"}
-    return {**own, "shown": True, "derived": True}

@@ -8,43 +8,42 @@ from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS
 from kempf.warehouse import aliases, diagnoses, history, notes
 from kempf.workbench.documents.logs import listed_logs
-from kempf.workbench.documents.manoeuvres import listed_manoeuvres
+from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike
 from kempf.workbench.documents.parameter_sets import listed_sets
 from kempf.workbench.documents.vessel import vessel_document
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages import changes, jobs
-from kempf.workbench.web.pages.manoeuvre_names import logs_begin_alike
 from kempf.workbench.web.pages.page import Page
 
 #: entries of a list that the page shows
 MOST = 60
 
 
-def document(desk: Desk, vessel: str) -> dict[str, Any]:
+def document(app_state: AppState, vessel: str) -> dict[str, Any]:
     """Return what `kempf vessels show NAME --json` prints."""
-    return vessel_document(desk.warehouse, vessel)
+    return vessel_document(app_state.warehouse, vessel)
 
 
-def gather(desk: Desk, vessel: str) -> Page:
+def gather(app_state: AppState, vessel: str) -> Page:
     """Return the page of a vessel."""
-    warehouse = desk.warehouse
+    warehouse = app_state.warehouse
     sets = listed_sets(warehouse, vessel)
     standing = set(history.standing(warehouse, vessel))
     manoeuvres = listed_manoeuvres(warehouse, vessel).documents
-    over_time = changes.content(desk, vessel, {}) if sets else {}
+    over_time = changes.content(app_state, vessel, {}) if sets else {}
     content = {
         "vessel": vessel,
-        "profile": document(desk, vessel)["profile"],
+        "profile": document(app_state, vessel)["profile"],
         "lists": _newest(
             logs=listed_logs(warehouse, vessel).documents,
             manoeuvres=manoeuvres,
             sets=[{**row, "standing": row["parameter_set_id"] in standing} for row in sets],
         ),
-        "diagnoses": [diagnosis.show() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
-        "notes": [note.show() for note in notes.of_vessel(warehouse, vessel)],
+        "diagnoses": [diagnosis.as_json() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
+        "notes": [note.as_json() for note in notes.of_vessel(warehouse, vessel)],
         "current": any(aliases.CURRENT in row["aliases"] for row in sets),
         "ladder": any(aliases.CURRENT in row["aliases"] and row["estimator"] in (POOLED, WITH_EFFECTS) for row in sets),
-        "jobs": jobs.rows([job for job in desk.queue.active() if job.arguments["vessel"] == vessel]),
+        "jobs": jobs.rows([job for job in app_state.queue.active() if job.arguments["vessel"] == vessel]),
         "stale": said_of_vessel(warehouse, vessel),
         "history": over_time.get("drawn"),
         "history_words": over_time.get("drawn_words"),
@@ -70,16 +69,16 @@ def _newest(**lists: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
     }
 
 
-def manoeuvres_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+def manoeuvres_document(app_state: AppState, vessel: str) -> list[dict[str, Any]]:
     """Return what `kempf segments --vessel NAME --json` prints."""
-    return listed_manoeuvres(desk.warehouse, vessel).documents
+    return listed_manoeuvres(app_state.warehouse, vessel).documents
 
 
-def logs_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+def logs_document(app_state: AppState, vessel: str) -> list[dict[str, Any]]:
     """Return what `kempf logs list --vessel NAME --json` prints."""
-    return listed_logs(desk.warehouse, vessel).documents
+    return listed_logs(app_state.warehouse, vessel).documents
 
 
-def sets_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+def sets_document(app_state: AppState, vessel: str) -> list[dict[str, Any]]:
     """Return what `kempf params list --vessel NAME --json` prints."""
-    return listed_sets(desk.warehouse, vessel)
+    return listed_sets(app_state.warehouse, vessel)

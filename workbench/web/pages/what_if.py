@@ -8,19 +8,19 @@ from typing import Any
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.what_if import draw_what_if
 from kempf.workbench.web.pages.answer import Answer, answer
 from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
 
-def document(desk: Desk, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
+def document(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf what-if PARAMETER --vessel NAME --json` prints, where it was made; else None."""
-    return _asked_for(desk, vessel, fields)[1].document
+    return _asked_for(app_state, vessel, fields)[1].document
 
 
-def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
+def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a parameter that is moved.
 
     Parameters
@@ -28,8 +28,8 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     fields : mapping of str to str
         ``parameter``, ``set``, ``segment``, any of them.
     """
-    parameter_set, reply = _asked_for(desk, vessel, fields)
-    names = names_of(desk.warehouse, vessel)
+    parameter_set, reply = _asked_for(app_state, vessel, fields)
+    names = names_of(app_state.warehouse, vessel)
     content: dict[str, Any] = {
         "vessel": vessel,
         "asked": reply.arguments,
@@ -50,12 +50,12 @@ def gather(desk: Desk, vessel: str, fields: Mapping[str, str]) -> Page:
     return Page("what_if.html", "What if", content, ((vessel, of_vessel(vessel)),))
 
 
-def _asked_for(desk: Desk, vessel: str, fields: Mapping[str, str]) -> tuple[ParameterSet, Answer]:
+def _asked_for(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> tuple[ParameterSet, Answer]:
     """Return the set that is asked for, and the answer; where no parameter is, of the set's first one."""
-    parameter_set = chosen_set(desk.warehouse, vessel, fields.get("set") or None)[0]
+    parameter_set = chosen_set(app_state.warehouse, vessel, fields.get("set") or None)[0]
     named = {
         **fields,
         "set": parameter_set.parameter_set_id,
         "parameter": fields.get("parameter") or parameter_set.parameters[0].name,
     }
-    return parameter_set, answer(desk, "what_if", vessel, named)
+    return parameter_set, answer(app_state, "what_if", vessel, named)

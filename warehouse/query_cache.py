@@ -25,7 +25,7 @@ _lock = threading.Lock()
 _kept: dict[Hashable, tuple[_Versions, object]] = {}
 
 
-def remembered(warehouse: Warehouse, tables: Sequence[str], question: Hashable, make: Callable[[], T]) -> T:
+def cached(warehouse: Warehouse, tables: Sequence[str], question: Hashable, make: Callable[[], T]) -> T:
     """Return what ``make`` reads of some tables, without reading them again where none has a newer version.
 
     What is returned is not to be changed.

@@ -13,7 +13,7 @@ from kempf.workbench.web.jobs.engine import run
 _PAUSE_S, _LONGEST_S = 0.2, 10.0
 
 
-class Keeper:
+class EngineSupervisor:
     """An engine and the thread that watches it.
 
     Parameters

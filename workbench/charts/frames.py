@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
-from kempf.workbench.web.data.bins import Shown
+from kempf.workbench.charts.bins import Shown
 
 
 def encoded(start_utc_ns: int, end_utc_ns: int, shown: Mapping[str, Shown]) -> bytes:
@@ -37,15 +35,3 @@ def encoded(start_utc_ns: int, end_utc_ns: int, shown: Mapping[str, Shown]) -> b
         for part in (channel.time_s, channel.value)
     ]
     return padded.encode("ascii") + b"".join(parts)
-
-
-def decoded(answer: bytes) -> tuple[dict[str, Any], dict[str, tuple[Float, Float]]]:
-    """Return the header of an answer, and seconds and values by channel."""
-    line, _, rest = answer.partition(b"\n")
-    head = json.loads(line)
-    numbers, channels, at = np.frombuffer(rest, dtype="<f4").astype(np.float64), {}, 0
-    for entry in head["series"]:
-        n = entry["count"]
-        channels[entry["name"]] = (numbers[at : at + n], numbers[at + n : at + 2 * n])
-        at += 2 * n
-    return head, channels

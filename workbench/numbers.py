@@ -2,7 +2,34 @@
 
 from __future__ import annotations
 
-from math import degrees, floor, isfinite, log10, pi
+from math import degrees, floor, isfinite, isnan, log10, pi
+
+#: a larger number is written with its power of ten
+_WHOLE = 1e6
+
+
+def number(value: float | None, digits: int = 4) -> str:
+    """Write a number with so many significant digits, whole below a million; a dash for none.
+
+    Examples
+    --------
+    >>> number(-0.000130912), number(None), number(1362.4, 3), number(12.3e6, 3)
+    ('-0.0001309', '-', '1362', '1.23e+07')
+    """
+    if value is None or isnan(value):
+        return "-"
+    return f"{value:.0f}" if 10.0**digits <= abs(value) < _WHOLE else f"{value:.{digits}g}"
+
+
+def percent(share: float | None, digits: int = 3) -> str:
+    """Write a share in percent, without the sign; a dash for none. See `number`.
+
+    Examples
+    --------
+    >>> percent(0.0314159), percent(None)
+    ('3.14', '-')
+    """
+    return "-" if share is None else number(100.0 * share, digits)
 
 
 def in_degrees(value: float, std: float, unit: str) -> tuple[float, float, str]:

@@ -6,23 +6,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.web.data.kept import KeptChannels
+from kempf.workbench.web.data.channel_cache import ChannelCache
 from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.uploads import Uploads
 
 
 @dataclass(frozen=True)
-class Desk:
+class AppState:
     """A warehouse that is looked at, and what was computed for its pages."""
 
     warehouse: Warehouse
     #: Folder of jobs and of predictions; to lose it costs time only.
-    state: Path
-    channels: KeptChannels = field(init=False)
+    folder: Path
+    channels: ChannelCache = field(init=False)
     queue: Queue = field(init=False)
     uploads: Uploads = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "channels", KeptChannels(self.warehouse))
-        object.__setattr__(self, "queue", Queue(self.state / "jobs.sqlite"))
-        object.__setattr__(self, "uploads", Uploads(self.state / "uploads"))
+        object.__setattr__(self, "channels", ChannelCache(self.warehouse))
+        object.__setattr__(self, "queue", Queue(self.folder / "jobs.sqlite"))
+        object.__setattr__(self, "uploads", Uploads(self.folder / "uploads"))

@@ -13,18 +13,11 @@ from kempf.warehouse.store import Warehouse
 MOST_BYTES = 512 * 2**20
 
 
-class KeptChannels:
-    """Channels by ingest, the ones that were not asked for the longest go first.
+class ChannelCache:
+    """Channels by ingest, the ones that were not asked for the longest go first; the one asked for last stays."""
 
-    Parameters
-    ----------
-    warehouse : Warehouse
-    most_bytes : int, optional
-        What they may take together; the one asked for last stays, however large.
-    """
-
-    def __init__(self, warehouse: Warehouse, most_bytes: int = MOST_BYTES) -> None:
-        self._warehouse, self._most = warehouse, most_bytes
+    def __init__(self, warehouse: Warehouse) -> None:
+        self._warehouse = warehouse
         self._held: OrderedDict[str, Instruments] = OrderedDict()
         self._lock = Lock()
 
@@ -38,7 +31,7 @@ class KeptChannels:
         with self._lock:
             self._held[ingest_id] = instruments
             self._held.move_to_end(ingest_id)
-            while len(self._held) > 1 and sum(map(_bytes, self._held.values())) > self._most:
+            while len(self._held) > 1 and sum(map(_bytes, self._held.values())) > MOST_BYTES:
                 self._held.popitem(last=False)
         return instruments
 

@@ -11,7 +11,7 @@ from kempf.workbench.web.jobs.queue import Queue, Tick
 _APART_S = 0.2
 
 
-class Ticking:
+class JobProgress:
     """A `kempf.flows.process.progress.FitProgress`.
 
     Parameters

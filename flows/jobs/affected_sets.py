@@ -12,7 +12,7 @@ from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True)
-class Following:
+class Affected:
     """What follows for a vessel where logs or manoeuvres of hers count no longer."""
 
     vessel: str
@@ -25,7 +25,7 @@ class Following:
     #: Whether her current set is among them.
     current: bool
 
-    def show(self) -> dict[str, Any]:
+    def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
         return {
             "vessel": self.vessel,
@@ -36,7 +36,7 @@ class Following:
         }
 
 
-def of_logs(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
+def of_logs(warehouse: Warehouse, rows: Sequence[LogRow]) -> Affected:
     """Return what follows where some logs of one vessel count no longer.
 
     Parameters
@@ -46,22 +46,22 @@ def of_logs(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
     """
     vessel, ingests = rows[0].vessel, {row.ingest_id for row in rows}
     gone = tuple(segment.segment_id for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in ingests)
-    return _following(warehouse, vessel, tuple(rows), gone, {row.log_id for row in rows}, set())
+    return _affected(warehouse, vessel, tuple(rows), gone, {row.log_id for row in rows}, set())
 
 
-def of_segments(warehouse: Warehouse, vessel: str, segment_ids: Sequence[str]) -> Following:
+def of_segments(warehouse: Warehouse, vessel: str, segment_ids: Sequence[str]) -> Affected:
     """Return what follows where some manoeuvres of a vessel count no longer, or with other bounds."""
-    return _following(warehouse, vessel, (), tuple(segment_ids), set(), set(segment_ids))
+    return _affected(warehouse, vessel, (), tuple(segment_ids), set(), set(segment_ids))
 
 
-def _following(
+def _affected(
     warehouse: Warehouse,
     vessel: str,
     rows: tuple[LogRow, ...],
     gone: tuple[str, ...],
     log_ids: Collection[str],
     segment_ids: Collection[str],
-) -> Following:
+) -> Affected:
     held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
     superseded = [
         parameter_set.parameter_set_id
@@ -71,4 +71,4 @@ def _following(
         )
     ]
     current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    return Following(vessel, rows, gone, tuple(superseded), current in superseded)
+    return Affected(vessel, rows, gone, tuple(superseded), current in superseded)
