@@ -49,7 +49,7 @@ def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
     # the kernels that sail them take a while to load, and whoever only asks does not need them
     from kempf.pipeline.manoeuvre.pull_out import PullOut
     from kempf.pipeline.manoeuvre.spiral import Spiral
-    from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+    from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
     from kempf.pipeline.manoeuvre.zigzag import Zigzag
 
     required(request)
@@ -59,7 +59,7 @@ def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
         return Zigzag(radians(heading), radians(rudder), side)
     angle = _rudder_deg(request)
     if request.kind == "turning-circle":
-        return TurningCircle(radians(angle), side)
+        return PredictedCircle(radians(angle), side)
     return PullOut(radians(angle), side) if request.kind == "pull-out" else Spiral(radians(angle))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
-from kempf.pipeline.diagnose.matters import comparisons
+from kempf.pipeline.diagnose.improves_prediction import comparisons
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.agreement import Agreement, agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit

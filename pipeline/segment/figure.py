@@ -10,7 +10,7 @@ _WIDE = 1.96
 
 
 @dataclass(frozen=True)
-class Figure:
+class MeasuredFigure:
     """A figure in the unit that its name ends on."""
 
     #: None where the log does not hold it.
@@ -22,7 +22,7 @@ class Figure:
     why: str = ""
 
     @classmethod
-    def of(cls, value: float, std: float, why: str = "") -> Figure:
+    def of(cls, value: float, std: float, why: str = "") -> MeasuredFigure:
         """Return the figure of an estimate and its standard error; NaN for what is not known, and then why."""
         if not isfinite(value):
             return cls(None, None, None, why)

@@ -16,7 +16,7 @@ from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.pull_out import PullOut, paired, pull_out
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.spiral import Spiral, find_spirals
-from kempf.pipeline.segment.turning_circle import TurningCircle, turning_circle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle, turning_circle
 from kempf.pipeline.segment.turns import find_turns, regions
 from kempf.pipeline.segment.zigzag import Zigzag
 
@@ -28,7 +28,7 @@ _SMALLEST_TURN_RAD = float(np.pi / 3)
 
 def find_turning(
     instruments: Instruments, zigzags: Sequence[Zigzag] = (), settings: SegmentSettings = _DEFAULT
-) -> list[TurningCircle | PullOut | Spiral]:
+) -> list[MeasuredCircle | PullOut | Spiral]:
     """Find every turning circle, pull-out and direct spiral in a log.
 
     Parameters
@@ -42,7 +42,7 @@ def find_turning(
 
     Returns
     -------
-    list of TurningCircle, PullOut or Spiral
+    list of MeasuredCircle, PullOut or Spiral
         In order of time; empty where there is none, or heading or rudder are missing. A step of a spiral is no circle
         and no pull-out.
 
@@ -57,7 +57,7 @@ def find_turning(
     begin_s = max(float(signals.heading_s[0]), float(signals.rudder_s[0]))
     end_s = min(float(signals.heading_s[-1]), float(signals.rudder_s[-1]))
     turns = find_turns(signals.heading_s, signals.heading, _SMALLEST_TURN_RAD)
-    manoeuvres: list[TurningCircle | PullOut | Spiral] = []
+    manoeuvres: list[MeasuredCircle | PullOut | Spiral] = []
     pull_outs: list[PullOut] = []
     for start, end in regions(turns, begin_s, end_s):
         first, behind = np.searchsorted(signals.rudder_s, [start, end + 1e-9])

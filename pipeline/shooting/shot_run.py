@@ -13,8 +13,8 @@ from kempf.pipeline.model.batch import LANES, MOST
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.shooting.effect_states import integrate_effect_states
 from kempf.pipeline.shooting.kernel import shoot
-from kempf.pipeline.shooting.led import lead
 from kempf.pipeline.shooting.windows import Windows
 from kempf.schemas.model_spec import ModelSpec
 
@@ -113,7 +113,7 @@ class ShotRun:
         """Return the states of the effects at all instants of the run, shape (n, k, lanes)."""
         run = self.windows.run
         states = np.empty((run.measured.shape[0], self.model.extra, MOST))
-        lead(
+        integrate_effect_states(
             *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
             *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.current_row, constants),
             *(self.windows.course, np.ascontiguousarray(own), self.model.table, states, LANES),

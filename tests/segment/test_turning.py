@@ -18,7 +18,7 @@ from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.spiral import Spiral, SpiralPoint
 from kempf.pipeline.segment.turn_track import TurnTrack
-from kempf.pipeline.segment.turning_circle import TurningCircle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, direct_spiral
 from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn
@@ -33,13 +33,13 @@ LENGTHS = ("advance_m", "transfer_m", "tactical_diameter_m")
 UNSTABLE = {"straight": -0.5, "cubic": 1.0, "gain_per_s": 0.06}
 
 
-def circle_of(found: list[TurningCircle | PullOut | Spiral]) -> TurningCircle:
+def circle_of(found: list[MeasuredCircle | PullOut | Spiral]) -> MeasuredCircle:
     (circle,) = found
-    assert isinstance(circle, TurningCircle)
+    assert isinstance(circle, MeasuredCircle)
     return circle
 
 
-def tiny(ship: Ship, instruments: Instruments | None = None) -> list[TurningCircle | PullOut | Spiral]:
+def tiny(ship: Ship, instruments: Instruments | None = None) -> list[MeasuredCircle | PullOut | Spiral]:
     heading, rudder = measure(ship, instruments or Instruments())
     return find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
 
@@ -258,7 +258,7 @@ def test_zigzags_are_not_touched_and_nothing_is_found_twice() -> None:
     zigzags = find_manoeuvres(heading, rudder)
     found = find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()), zigzags)
     assert [z.kind for z in zigzags] == ["zigzag"]
-    assert [type(one) for one in found] == [TurningCircle, PullOut]
+    assert [type(one) for one in found] == [MeasuredCircle, PullOut]
     spans = [(z.start_utc_ns, z.end_utc_ns) for z in [*zigzags, *found]]
     assert all(end <= start for (_, end), (start, _) in pairwise(sorted(spans)))
 
@@ -267,7 +267,7 @@ def test_pull_outs_of_a_stable_ship_end_alike() -> None:
     steps = [(SteadyCourse(300.0), Turn(side * 20.0, 400.0), HeldRudder(0.0, 200.0)) for side in (1.0, -1.0)]
     trial = sailed((*steps[0], *steps[1]), "ferry")
     found = find_turning(instruments(trial))
-    assert [type(one) for one in found] == [TurningCircle, PullOut] * 2
+    assert [type(one) for one in found] == [MeasuredCircle, PullOut] * 2
     first, second = (one for one in found if isinstance(one, PullOut))
     assert (first.side, second.side) == ("starboard", "port")
     assert first.verdict == second.verdict == "no instability seen"
@@ -408,7 +408,7 @@ def test_speeds_of_nought_and_a_compass_that_fails_stop_nothing() -> None:
     still = Series(heading.time_utc_ns, np.zeros(len(heading)))
     channels = {"heading": heading, "rudder_angle": rudder, "speed_over_ground": still, "course_over_ground": still}
     for one in find_turning(Channels(channels, {}, ())):
-        assert isinstance(one, TurningCircle)
+        assert isinstance(one, MeasuredCircle)
         assert one.measured.figures["speed_loss_percent"].value is None
     early = heading.between(START_NS, START_NS + 150_000_000_000)
     assert find_turning(Channels({"heading": early, "rudder_angle": rudder}, {}, ())) == []

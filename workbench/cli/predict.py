@@ -19,7 +19,7 @@ from kempf.workbench.terminal import number, print_json, print_paragraph, print_
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
     from kempf.flows.jobs.predicted import Predicted
-    from kempf.pipeline.manoeuvre.prediction import Figure
+    from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
 
@@ -165,7 +165,7 @@ def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
         click.echo(f"  drawn: {figure}")
 
 
-def _row(name: str, figure: Figure, manoeuvre: dict[str, Any], model_scale: float | None) -> list[str]:
+def _row(name: str, figure: PredictedFigure, manoeuvre: dict[str, Any], model_scale: float | None) -> list[str]:
     base, _, place = name.partition(".")
     words, unit = in_words(base, int(place) if place else None, manoeuvre), FIGURES[base][1]
     if figure.value is None:

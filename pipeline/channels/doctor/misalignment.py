@@ -11,7 +11,7 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
 from kempf.pipeline.channels.doctor.motion import may_drift, moves, stream_std
-from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
@@ -65,7 +65,9 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
         return untestable(name, channels, "too few readings under way" if way is None else way.why_not)
     angle, std = way.angle, float(np.hypot(way.own_std, _LEEWAY_RAD))
     quantity = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
-    figure = Figure(quantity, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
+    figure = CheckFigure(
+        quantity, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg"
+    )
     words = f"{quantity} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
     if figure.state == "disagree" and not _repeated(log, kind, heading, velocity, angle):
         return untestable(name, channels, f"{words}, but not in every stretch of the log")
