@@ -9,14 +9,14 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import KempfError, UsageError
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import delta, examinations, notes, vessels
 from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.notes import Note
 from kempf.warehouse.parameter_set import UPDATES, Bounds, update_in
@@ -28,10 +28,6 @@ if TYPE_CHECKING:
     from deltalake import DeltaTable
 
     from kempf.warehouse.segments import Segment
-
-
-#: Half a 95 % interval, in standard errors.
-_HALF_WIDTH = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +57,7 @@ class History:
 
 
 def _interval(value: float, std: float | None) -> dict[str, float | None]:
-    half = None if std is None else _HALF_WIDTH * std
+    half = None if std is None else NORMAL_95 * std
     return {"low": None if half is None else value - half, "high": None if half is None else value + half}
 
 

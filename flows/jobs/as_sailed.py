@@ -19,7 +19,6 @@ from kempf.flows.jobs.spiral_ways import orders_of
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.draws import Identified
@@ -34,6 +33,7 @@ from kempf.pipeline.model.chain import F, R, V
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse import notes
 from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment

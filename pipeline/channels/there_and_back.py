@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Series, written
+from kempf.pipeline.channels.series import Float, Mask, Series
 from kempf.schemas.channels import CHANNELS
-from kempf.schemas.units import as_read
+from kempf.schemas.instants import written
+from kempf.schemas.units import SECOND_NS, as_read
 
 #: readings on either side of one: a leap of up to so many is none of their median
 _BESIDE = 2

@@ -16,7 +16,8 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import InstantErrors, instant_errors, said_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
-from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series
+from kempf.pipeline.channels.series import Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: time before and after a segment in which its instruments are looked at, s
 _AROUND_S = 1800

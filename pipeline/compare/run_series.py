@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.comparison import ORDER, ComparedRun
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.schemas.units import SECOND_NS
 
 _UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 

@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import RunResiduals
+from kempf.schemas.instants import iso_cut
+from kempf.schemas.units import MILLISECOND_NS, SECOND_NS
 
 #: a window in instants, with a few to spare of what `kempf explain` needs, and how many windows are shown of each kind
 _WINDOW, _SHOWN = 24, 5
 _FEWEST = 4
-_MS_NS = 1_000_000
 
 
 def worst(residuals: Sequence[RunResiduals]) -> list[dict[str, Any]]:
@@ -102,5 +103,4 @@ def _window(residuals: RunResiduals, at: int) -> dict[str, Any]:
 
 def _iso(start_utc_ns: int, seconds: float, *, up: bool) -> str:
     instant_ns = start_utc_ns + round(seconds * SECOND_NS)
-    whole_ms = -(-instant_ns // _MS_NS) if up else instant_ns // _MS_NS
-    return f"{np.datetime_as_string(np.datetime64(whole_ms, 'ms'), unit='ms')}Z"
+    return iso_cut(-(-instant_ns // MILLISECOND_NS) * MILLISECOND_NS if up else instant_ns)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
 from kempf.pipeline.diagnose.judged_run import JudgedRun
 from kempf.pipeline.estimate.record.grid_run import GridRun
@@ -22,6 +22,7 @@ from kempf.schemas.diagnosis_evidence import (
     PredictedManoeuvre,
 )
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 #: horizons of the table beside the free run; one that a run is too short for is left out
 HORIZONS = ("1", "10s", "60s", "free")

@@ -11,8 +11,9 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.rounding import rounding_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
 from kempf.pipeline.manoeuvre.ship import Start
+from kempf.schemas.units import SECOND_NS
 
 Complex = NDArray[np.complex128]
 #: the beginning is read over this part of the time in which she sails her own length, and over no less than that, s

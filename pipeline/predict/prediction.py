@@ -13,10 +13,9 @@ from kempf.pipeline.estimate.one_step_fit import fit_percent
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import CHANNELS, FreeRun, free_run_of
 from kempf.pipeline.predict.horizon import Horizon
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import DataRejected
 
-#: half width of a 95 % interval in standard deviations
-WIDTH_95 = 1.96
 #: a prediction counts when its variance is below this many times the median one: the first only carry the initial state
 _SETTLED = 3.0
 #: parts of a horizon; errors of its last part count, so that all predictions are between 3/4 and the whole of it ahead
@@ -61,7 +60,7 @@ class Predicted:
         for i, name in enumerate(CHANNELS):
             good = np.isfinite(self.error[:, i]) & np.isfinite(self.std[:, i])
             if good.any():
-                within = np.abs(self.error[good, i]) < WIDTH_95 * self.std[good, i]
+                within = np.abs(self.error[good, i]) < NORMAL_95 * self.std[good, i]
                 counts[name] = (int(np.count_nonzero(within)), int(np.count_nonzero(good)))
         return counts
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-#: Standard errors from the middle to the ends of a 95 % interval.
-_WIDE = 1.96
+from kempf.schemas.confidence import NORMAL_95
 
 
 @dataclass(frozen=True)
@@ -28,9 +27,9 @@ class MeasuredFigure:
             return cls(None, None, None, why)
         if not isfinite(std):
             return cls(value, None, None, why)
-        return cls(value, value - _WIDE * std, value + _WIDE * std)
+        return cls(value, value - NORMAL_95 * std, value + NORMAL_95 * std)
 
     @property
     def std(self) -> float:
         """Standard error; NaN where it is not known."""
-        return float("nan") if self.low is None or self.high is None else (self.high - self.low) / (2.0 * _WIDE)
+        return float("nan") if self.low is None or self.high is None else (self.high - self.low) / (2.0 * NORMAL_95)

@@ -12,7 +12,8 @@ import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 Source = Literal["positions", "speed and course over ground", "speed through the water and heading", "heading alone"]
 

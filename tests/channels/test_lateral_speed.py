@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, check_current, lateral_speed, noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
+from kempf.schemas.units import SECOND_NS
 
 START = 1_746_252_000_000_000_000
 

@@ -9,8 +9,9 @@ from kempf.pipeline.channels.doctor.log import EARTH_M, Log
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import velocity_lateness
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.undelayed_speeds import apart, undelayed_speeds, unsmoothed
+from kempf.schemas.units import SECOND_NS
 
 SPEED, PERIOD_S, LONG_S = 1.8, 0.2, 300.0
 FIX_STD_M, VELOCITY_STD_M_S = 0.8, 0.015

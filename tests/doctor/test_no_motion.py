@@ -11,7 +11,8 @@ from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination, 
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
 from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome
 from kempf.pipeline.channels.doctor.verdict import as_content
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 from tests.doctor import closed_form_ship
 
 STEP_S = 0.5

@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, smooth
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
@@ -32,6 +32,7 @@ from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import instruments_of, truth_of, without
 
 SETTINGS = MaximumLikelihoodSettings()

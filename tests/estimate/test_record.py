@@ -11,13 +11,14 @@ import pytest
 from kempf.pipeline.channels import undelayed_speeds
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.sampled import sample
 from kempf.pipeline.estimate.search.starts import thinned
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without
 
 TRIAL = sailed("ferry", seed=1, duration_s=400.0)

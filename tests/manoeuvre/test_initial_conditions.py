@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.manoeuvre.initial_conditions import initial_conditions
+from kempf.schemas.units import SECOND_NS
 
 
 def log_of(**columns: Float) -> Instruments:

@@ -7,13 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.by_hand import zigzag_between
 from kempf.pipeline.segment.corrections import applied, same, standing
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 from tests.segment.nomoto import Instruments, Ship, measure
 
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from kempf.schemas.errors import KempfError
+from kempf.schemas.instants import month_of
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta, logs, purges
-from kempf.warehouse.instant import month_of
 from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import scanned
 from kempf.warehouse.store import Warehouse

@@ -100,8 +100,8 @@ def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_jso
 @json_option
 def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     """List every correction that was made, with its reason and when."""
+    from kempf.schemas.instants import iso_utc
     from kempf.warehouse import corrections, logs, said, vessels
-    from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -173,7 +173,7 @@ def _words(planned: Planned) -> str:
 
 
 def _described(segment: Segment) -> str:
-    from kempf.warehouse.instant import iso_utc
+    from kempf.schemas.instants import iso_utc
 
     span = f"{iso_utc(segment.start_utc_ns)[:19]} to {iso_utc(segment.end_utc_ns)[:19]}"
     return f"{segment.segment_id} ({segment.words}, {span})"

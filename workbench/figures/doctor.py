@@ -10,7 +10,8 @@ import numpy as np
 from kempf.flows.jobs.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import CheckFigure
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.figures.drawn import pyplot, save
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 from kempf.pipeline.compare.comparison import ORDER, ComparedRun
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.prediction import WIDTH_95
+from kempf.schemas.confidence import NORMAL_95
 from kempf.workbench.figures.drawn import save
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def _panel(panel: Any, run: ComparedRun, name: str) -> None:
     panel.plot(prediction.time_s[known], measured[known], color="0.55", lw=2.2, label="measured")
     predicted = factor * prediction.predicted[:, i]
     if np.isfinite(prediction.std[:, i]).any():
-        width = factor * WIDTH_95 * prediction.std[:, i]
+        width = factor * NORMAL_95 * prediction.std[:, i]
         style = {"color": _PREDICTED, "alpha": 0.25, "lw": 0, "label": "95 % interval of the prediction"}
         panel.fill_between(prediction.time_s, predicted - width, predicted + width, **style)
         # while the initial state is not known the prediction is no statement
@@ -86,7 +86,7 @@ def _panel(panel: Any, run: ComparedRun, name: str) -> None:
 def _strip(strip: Any, run: ComparedRun, name: str) -> None:
     """Draw measured less predicted, with its interval where the model gives one."""
     prediction, i = run.predicted, CHANNELS.index(name)
-    error, width = (UNITS[name][1] * column for column in (prediction.error[:, i], WIDTH_95 * prediction.std[:, i]))
+    error, width = (UNITS[name][1] * column for column in (prediction.error[:, i], NORMAL_95 * prediction.std[:, i]))
     if np.isfinite(width).any():
         strip.fill_between(prediction.time_s, -width, width, color=_PREDICTED, alpha=0.25, lw=0)
     strip.plot(prediction.time_s, error, color="black", lw=0.7)

@@ -7,6 +7,7 @@ from math import isfinite
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import FittedParameter
+from kempf.schemas.instants import second
 from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
@@ -252,15 +253,11 @@ def _worst(content: ReportContent) -> TableBlock:
                 (
                     *(names[window["run"]], SampleBadge(held), window["measure"]),
                     *(window["channel"].replace("_", " "), (window["phase"] or "").replace("_", " ")),
-                    *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", _clock(window["start"]), size),
+                    *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", second(window["start"]), size),
                 )
             )
     head = ("manoeuvre", "sample", "horizon", "channel", "phase", "time, s", "begins, UTC", "rms error")
     return TableBlock("The windows with the largest errors, to look at in the logs", head, rows)
-
-
-def _clock(iso: str) -> str:
-    return iso[:19].replace("T", " ")
 
 
 def correlations(content: ReportContent) -> list[Block]:

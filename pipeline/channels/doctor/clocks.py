@@ -9,7 +9,8 @@ from __future__ import annotations
 from kempf.pipeline.channels.doctor.align import Alignment
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome, untestable, worst
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: Over a whole log two clocks may drift apart by so much, s: less is no gross fault.
 _DRIFT_S = 1.0

@@ -12,7 +12,8 @@ from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
 SLOPES = (0.8, 1.25)

@@ -10,7 +10,9 @@ from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series, written
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.instants import written
+from kempf.schemas.units import SECOND_NS
 
 #: The heading of so many readings, and of so long, s, is compared with that of as many before.
 _READINGS, _LEAST_S = 3, 2.5

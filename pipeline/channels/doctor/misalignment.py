@@ -14,7 +14,8 @@ from kempf.pipeline.channels.doctor.motion import may_drift, moves, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Leeway of a ship under way, one standard deviation, rad, and the deviation of a compass that is no gross fault.
 _LEEWAY_RAD, _DEVIATION_DEG = float(np.deg2rad(2.0)), 5.0

@@ -9,7 +9,7 @@ from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import fit, reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 _CHANNELS = ("rudder_order", "rudder_angle")
 _SLOPES, _OFFSETS_DEG = (0.7, 1.4), (-5.0, 5.0)

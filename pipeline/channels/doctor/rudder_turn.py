@@ -18,7 +18,8 @@ from kempf.pipeline.channels.doctor.motion import does_not_move, speed_of, under
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit, quantile, reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: A rudder that moves less than this shows nothing, rad; one that moves less than the second while the ship swings so
 #: many times farther is in another unit.

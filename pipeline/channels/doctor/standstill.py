@@ -11,7 +11,8 @@ from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: A channel stands still when it repeats itself so long, in so many readings, while the ship turns so far.
 _LEAST_S, _LEAST_READINGS, _TURN_DEG = 10.0, 10, 5.0

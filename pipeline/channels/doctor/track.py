@@ -11,7 +11,8 @@ from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noi
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import fit, quantile
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Ratios of the two ways that are no fault, and angles between them, deg.
 RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)

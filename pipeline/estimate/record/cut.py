@@ -12,7 +12,7 @@ from kempf.pipeline.channels.gear_runs import with_straight_runs
 from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.channels.there_and_back import counted
@@ -25,6 +25,7 @@ from kempf.pipeline.estimate.record.speed_error import SpeedError, rudder_of_spe
 from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.estimate.record.water_speed import water_speed
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 _MIN_INSTANTS = 40
 #: time beyond the segment over which the log is taken at least, s, and how many means that share no reading are enough

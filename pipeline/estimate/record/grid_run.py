@@ -11,7 +11,7 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import cell_means, instants_of, readings_averaged, step_of
@@ -24,6 +24,7 @@ from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
+from kempf.schemas.units import SECOND_NS
 
 _APPROACH_S = 5.0
 #: column of the shaft speed in `GridRun.inputs`

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: a change beyond so many robust standard deviations of the changes over such a time is a leap
 _LEAP = 6.0

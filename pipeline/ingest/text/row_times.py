@@ -11,9 +11,10 @@ import polars as pl
 
 from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index, Spans, spans_of
-from kempf.pipeline.ingest.text.times import SECOND_NS, decimal_times, iso_instants
+from kempf.pipeline.ingest.text.times import decimal_times, iso_instants
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.profile import TimeColumn, start_ns
+from kempf.schemas.units import SECOND_NS
 
 #: Largest count of nanoseconds that is added to a start, so that the sum is an int64.
 _FARTHEST = 1 << 62

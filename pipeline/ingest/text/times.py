@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from decimal import ROUND_HALF_EVEN, Decimal, InvalidOperation
-from typing import Literal
 
 import numpy as np
 import polars as pl
@@ -21,12 +20,10 @@ from kempf.pipeline.ingest.text.cells import (
     leading_digits,
     words,
 )
-
-DAY_NS = 86_400_000_000_000
-SECOND_NS = 1_000_000_000
+from kempf.schemas.units import DAY_NS, MILLISECOND_NS, SECOND_NS
 
 #: Nanoseconds of every unit that a profile may give a time in.
-NS_PER: Mapping[str, int] = {"s": SECOND_NS, "ms": 1_000_000, "us": 1_000, "ns": 1, "d": DAY_NS}
+NS_PER: Mapping[str, int] = {"s": SECOND_NS, "ms": MILLISECOND_NS, "us": 1_000, "ns": 1, "d": DAY_NS}
 
 _MONTH_DAYS = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
 _POWER = 10 ** np.arange(10, dtype=np.int64)
@@ -66,17 +63,6 @@ def days_since_1970(
     y = year - (month <= 2)
     of_year = (153 * (month + np.where(month > 2, -3, 9)) + 2) // 5 + day - 1
     return 365 * y + y // 4 - y // 100 + y // 400 + of_year - 719_468, exists
-
-
-def instant_words(time_utc_ns: int, unit: Literal["s", "ms"] = "ms") -> str:
-    """Return an instant as messages write it, cut to a unit.
-
-    Examples
-    --------
-    >>> instant_words(1_746_252_300_640_000_000), instant_words(1_746_252_300_640_000_000, "s")
-    ('2025-05-03T06:05:00.640Z', '2025-05-03T06:05:00Z')
-    """
-    return f"{np.datetime64(time_utc_ns, 'ns').astype(f'datetime64[{unit}]')}Z"
 
 
 def iso_instants(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:

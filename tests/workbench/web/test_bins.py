@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.web.data.bins import _BLOCKS, reduced
 from kempf.workbench.web.data.frames import decoded, encoded
 

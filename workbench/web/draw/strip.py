@@ -9,7 +9,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.pipeline.channels.series import Float, Mask
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.web.data.predictions import UNITS
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import element

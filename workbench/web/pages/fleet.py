@@ -7,10 +7,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from kempf.schemas.instants import iso_utc
 from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.vessel_counts import counted, vessel_counts
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages.page import Page

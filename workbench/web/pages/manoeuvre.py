@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.schemas.instants import iso_utc, minute
 from kempf.warehouse import aliases, logs, lost, notes, segments
-from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
@@ -77,7 +77,7 @@ def gather(desk: Desk, segment_id: str, fields: Mapping[str, str]) -> Page:
             }
             content |= {"channels": [*content["channels"], derived()]}
             content["stretch"] = _stretch(prediction, set_id, horizon, fields.get("worst", ""))
-    title = f"{span_of(segment)['words']}, {iso_utc(segment.start_utc_ns)[:16].replace('T', ' ')} UTC"
+    title = f"{span_of(segment)['words']}, {minute(iso_utc(segment.start_utc_ns))} UTC"
     above = ((row.vessel, of_vessel(row.vessel)), (row.file_name, f"/logs/{row.log_id}"))
     return Page("manoeuvre.html", title, content, above)
 
