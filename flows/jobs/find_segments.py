@@ -13,8 +13,8 @@ from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.segment import corrections
 from kempf.pipeline.segment.by_hand import zigzag_between
 from kempf.pipeline.segment.corrections import Marked, Standing
-from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
@@ -69,12 +69,12 @@ def find_segments(
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
     standing = corrections.standing(log_corrections)
     marked, notes = corrections.applied(
-        find_manoeuvres(heading, rudder, speed),
+        find_zigzags(heading, rudder, speed),
         standing,
         lambda bounds: zigzag_between(heading, rudder, speed, *bounds),
     )
     manoeuvres = [_marked(marked_zigzag, ingest, profile, instruments) for marked_zigzag in marked]
-    turning = find_turning(instruments, [marked_zigzag.zigzag for marked_zigzag in marked])
+    turning = find_circles_and_spirals(instruments, [marked_zigzag.zigzag for marked_zigzag in marked])
     others = [_kept_aside(manoeuvre, ingest, profile) for manoeuvre in turning]
     spans = [(segment.start_utc_ns, segment.end_utc_ns) for segment in (*manoeuvres, *others)]
     others += [_random(manoeuvre, ingest, profile, instruments) for manoeuvre in find_random(instruments, spans)]

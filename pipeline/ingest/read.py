@@ -1,4 +1,4 @@
-"""The one way in: a log's bytes and its vessel's profile, out come its readings, at once or part by part."""
+"""The one way in: a log's bytes and its vessel's profile, out come its readings, part by part."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from kempf.pipeline.ingest.decoded import Decoded, MalformedRows
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.readings import Readings, Tally, joined
+from kempf.pipeline.ingest.readings import Readings, Tally
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.pipeline.ingest.unset_clock import dated_parts
@@ -46,17 +46,6 @@ _CUT = 160
 _SEE_PROFILE = "See docs/profile.md for how to describe a log."
 
 
-def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Readings:
-    """Read one log and hold all of it; arguments and errors as in `read_parts`.
-
-    Returns
-    -------
-    Readings
-        In canonical channels, SI and UTC, with everything that was refused and why.
-    """
-    return joined(list(read_parts(name, log, profile)))
-
-
 def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Iterator[Readings]:
     """Read one log, some ten thousand messages at a time where the format allows it (MCAP), else in one part.
 
@@ -72,7 +61,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
     ------
     Readings
         In the order of the log, but that of each source some records may come with the part behind their own; notes and
-        what is lost with the last part. See `kempf.pipeline.ingest.readings.joined`.
+        what is lost with the last part.
 
     Raises
     ------

@@ -99,7 +99,7 @@ def sailed(north: float, east: float, heading_deg: float) -> Trial:
 
 def measured(trial: Trial) -> dict[str, Series]:
     """Channels over whole cycles of the zigzag, at their instants of measurement."""
-    crossings = trial.truth.zigzags[0].crossings_s
+    crossings = trial.truth.zigzags[0].executes_s[1:]
     start = trial.settings.start_utc_ns + round(crossings[0] * SECOND_NS)
     end = trial.settings.start_utc_ns + round(crossings[2 * ((len(crossings) - 1) // 2)] * SECOND_NS)
     found = {}
