@@ -27,6 +27,7 @@ from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
 from kempf.schemas.frozen import Frozen
+from kempf.schemas.side import Side
 from kempf.schemas.units import SECOND_NS, factor_to_si
 
 #: From here on spreadsheets count days, those of old Macintosh computers from the second.
@@ -54,7 +55,7 @@ class ChannelMap(Frozen):
     channel: str
     unit: str
     #: which side counts as positive in the log; ``port`` turns the sign
-    positive: Literal["starboard", "port"] = "starboard"
+    positive: Side = "starboard"
     #: added after the sign is turned, in ``unit``: a known mounting or index error
     offset: float = 0.0
     #: factor on the reading, before the offset: an instrument that is known to read so much too little

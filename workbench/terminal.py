@@ -122,11 +122,6 @@ def _is_number(text: str) -> bool:
     return text.strip("+-").replace(".", "", 1).replace("e-", "", 1).replace("e+", "", 1).isdigit() or text in ("", "-")
 
 
-def counted(number_of: int, noun: str) -> str:
-    """Return a number with its noun, such as ``1 zigzag`` or ``2 zigzags``."""
-    return f"{number_of} {noun}{'' if number_of == 1 else 's'}"
-
-
 #: a larger number is written with its power of ten
 _WHOLE = 1e6
 

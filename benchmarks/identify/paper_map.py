@@ -22,11 +22,11 @@ from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.paper import ship
 from kempf.pipeline.estimate.paper.least_squares import regress
 from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedureSettings, iterate
+from kempf.pipeline.estimate.paper.vehicle import LinearVehicle
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discrete_from_continuous
-from kempf.pipeline.model.vehicle import LinearVehicle
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.instruments import Instrument
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings

@@ -7,6 +7,7 @@ from math import isfinite, radians
 from typing import TYPE_CHECKING, Literal
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 
 if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
@@ -29,7 +30,7 @@ class PredictRequest:
     #: Heading and rudder of a zigzag.
     angles_deg: tuple[float, float] = (20.0, 20.0)
     #: Of the turn, or of the first execute.
-    side: Literal["starboard", "port"] = "starboard"
+    side: Side = "starboard"
     #: Of the approach; None takes the mean of those that were sailed.
     speed_m_s: float | None = None
     #: Of another steering gear; None takes the rudder's rate that the logs show.

@@ -15,6 +15,17 @@ Nanoseconds = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 
+def wrapped(angle: Float | float) -> Float:
+    """Return angles, rad, brought into [-pi, pi) by whole turns; of the shape given.
+
+    Examples
+    --------
+    >>> wrapped(np.array([0.0, 1.5, -1.5]) * np.pi).tolist() == (np.array([0.0, -0.5, 0.5]) * np.pi).tolist()
+    True
+    """
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi, dtype=np.float64)
+
+
 @dataclass(frozen=True, eq=False)
 class Series:
     """Values of one channel at their instants of measurement."""

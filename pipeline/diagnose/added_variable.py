@@ -15,9 +15,9 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.nuisance import nuisance
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.diagnosis_evidence import AddedVariable
+from kempf.schemas.model_spec import N_HULL
 
 _BINS = 14
 

@@ -12,7 +12,7 @@ from kempf.pipeline.ingest.decoded import MalformedRows
 from kempf.pipeline.ingest.layout import Layout
 from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA
-from kempf.schemas.enumeration import at_the_beginning
+from kempf.schemas.enumeration import at_the_beginning, counted
 from kempf.schemas.profile import TimeColumn
 
 #: Damage is a few rows here and there: of so many, and of such a share, the layout is to blame.
@@ -106,7 +106,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> MalformedRows |
             "Write a name for every cell of a row into the header, in a copy of the log, or into `columns` of the "
             "source (with `header_lines: 1` for the line that names them now); or correct `separator`."
         )
-    expected = f"the profile names {width} column{'s' if width != 1 else ''}" if named else f"the header has {width}"
+    expected = f"the profile names {counted(width, 'column')}" if named else f"the header has {width}"
     parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
         layout.separator, f" parted by {layout.separator!r}"
     )
@@ -114,7 +114,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> MalformedRows |
     others = f", and {more} {'has' if more == 1 else 'have'} another number" if more else ""
     has = "has" if at.size == 1 else "have"
     rows = at_the_beginning(_of_all(at.size, n))
-    found = f"{rows} {has} {usual} cell{'s' if usual != 1 else ''}{parted}{where}{others}; {expected}."
+    found = f"{rows} {has} {counted(usual, 'cell')}{parted}{where}{others}; {expected}."
     return MalformedRows(found, step, wrong.size)
 
 

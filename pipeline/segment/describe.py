@@ -20,10 +20,10 @@ from kempf.pipeline.segment.zigzag import (
     Phase,
     PhaseName,
     Quality,
-    Side,
     SpeedConstancy,
     Zigzag,
 )
+from kempf.schemas.side import Side
 
 #: Change of speed after the second execute from which it is called not constant, percent.
 _SPEED_TREND_PERCENT = 10.0

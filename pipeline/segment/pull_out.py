@@ -20,7 +20,7 @@ from kempf.pipeline.segment.nominal import RUDDER_TOLERANCE, nominal_angle
 from kempf.pipeline.segment.ramps import measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.yaw_rate import MeanYawRate, mean_yaw_rate, settling_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: What a pair of pull-outs says about the ship on a straight course.
 Verdict = Literal["unstable", "no instability seen", "not judged"]

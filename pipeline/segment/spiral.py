@@ -19,7 +19,7 @@ from kempf.pipeline.segment.held_rudder import HeldRudder, band
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.yaw_rate import settling_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: Whether the way there and the way back differ.
 Loop = Literal["seen", "none seen", "not judged"]

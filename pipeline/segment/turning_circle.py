@@ -22,7 +22,7 @@ from kempf.pipeline.segment.switching import Start
 from kempf.pipeline.segment.turn_track import track_of
 from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD
 from kempf.pipeline.segment.yaw_rate import mean_yaw_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: Heading change that makes a circle of a turn from a steady approach, rad; from any other one it has to be steady.
 _HALF_TURN = pi

@@ -16,9 +16,8 @@ from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.shooting.effect_states import integrate_effect_states
 from kempf.pipeline.shooting.kernel import shoot
 from kempf.pipeline.shooting.windows import Windows
-from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.model_spec import N_HULL, ModelSpec
 
-N_HULL = 6
 #: what may be off nothing for a whole manoeuvre, parts of the ship's own scales: F, M, c_1, c_2, b
 _OWN = 5
 #: F in U^2/L, M in U^2/L^2, current in U, bias of the rate gyro in U/L

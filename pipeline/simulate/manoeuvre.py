@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, pi, radians
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.plant import AUTOPILOT, FIXED, ORDERS, ZIGZAG
+from kempf.schemas.side import Side
 
 Float = NDArray[np.float64]
-Side = Literal["starboard", "port"]
 
 #: Time between two orders of the helmsman or the autopilot, s.
 TICK_S = 0.5

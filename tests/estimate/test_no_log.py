@@ -18,13 +18,13 @@ from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, s
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.no_log.companions import Passage, check_engine, companions_of, has_log
 from kempf.pipeline.estimate.no_log.identify import SPEED_POWER, NoLogSettings, identify_without_log
+from kempf.pipeline.estimate.no_log.lateral_steps import SlowForces, lateral_steps
+from kempf.pipeline.estimate.no_log.longitudinal import PATH, SPEED, Surge, discretise_surge
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.estimate.search.starts import thinned
-from kempf.pipeline.model.lateral_steps import SlowForces, lateral_steps
-from kempf.pipeline.model.longitudinal import PATH, SPEED, Surge, discretise_surge
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest

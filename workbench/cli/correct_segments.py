@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.instants import utc_ns_of
-from kempf.workbench.terminal import counted, one_line, print_json, print_table
+from kempf.workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.correct_segments import Planned

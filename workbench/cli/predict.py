@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words, scaled
@@ -36,9 +38,7 @@ _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
     help="Rudder of circle, pull-out or spiral; default: 35, 20 and 20.",
 )
 @click.option("--angles", metavar="HEADING/RUDDER", help="Of a zigzag, degrees; default: 20/20.")
-@click.option(
-    "--side", type=click.Choice(["starboard", "port"]), default="starboard", show_default=True, help="Of the turn."
-)
+@click.option("--side", type=click.Choice(get_args(Side)), default="starboard", show_default=True, help="Of the turn.")
 @click.option(
     "--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed."
 )
@@ -102,8 +102,8 @@ def command(
             by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
             print_paragraph(f"not compared, as they are of other angles: {by_option}")
         if not compare and manoeuvre != "zigzag" and (count := measured_kind(Warehouse(uri), predicted)):
-            words = f"{manoeuvre.replace('-', ' ')}{'s' if count > 1 else ''}"
-            print_paragraph(f"measured: {count} {words}; --compare lays the prediction over those of this rudder")
+            measured_ones = counted(count, manoeuvre.replace("-", " "))
+            print_paragraph(f"measured: {measured_ones}; --compare lays the prediction over those of this rudder")
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 from kempf.schemas.diagnosis_evidence import FittedParameter
 from kempf.schemas.instants import second
+from kempf.schemas.motion_channel import MOTION
 from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
@@ -36,7 +37,7 @@ from kempf.workbench.report.content import (
 )
 from kempf.workbench.report.numbers import with_error
 
-_CHANNELS = {"heading": "heading", "yaw_rate": "yaw rate", "lateral_speed": "lateral speed"}
+_CHANNELS = ("heading", "yaw_rate", "lateral_speed")
 
 
 def _picture(figure: Any, alt: str, caption: str) -> PictureBlock:
@@ -175,7 +176,7 @@ def _fit_table(content: ReportContent) -> TableBlock:
     every = [fits for manoeuvre in content.manoeuvres for fits in manoeuvre.evidence.before.fit_percent.values()]
     channels = [name for name in _CHANNELS if any(name in fits for fits in every)]
     head = ["manoeuvre", "sample", "horizon"]
-    head += [f"{_CHANNELS[name]}, {model}" for name in channels for model in _models(content)]
+    head += [f"{MOTION[name].words}, {model}" for name in channels for model in _models(content)]
     rows: list[list[Cell]] = []
     for manoeuvre in _held_out_first(content):
         predicted = [each for each in (manoeuvre.evidence.before, manoeuvre.evidence.after) if each is not None]

@@ -14,6 +14,7 @@ from kempf.pipeline.channels.doctor.motion import may_drift, moves, stream_std
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
 from kempf.pipeline.channels.series import Float, Series
 from kempf.schemas.units import SECOND_NS
 
@@ -152,7 +153,7 @@ def _repeated(log: Log, kind: str, heading: Series, velocity: Velocity, angle: f
 
 def _varies(speed: Float) -> float:
     """Return the standard deviation of speeds, from their median size beside the median, m/s."""
-    return 1.4826 * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
+    return MAD_TO_STD * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
 
 
 def _columns(bow: Float, rate: Float) -> Float:

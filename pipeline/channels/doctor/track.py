@@ -11,6 +11,7 @@ from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noi
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import fit, quantile
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.schemas.units import SECOND_NS
 
@@ -126,7 +127,7 @@ def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: 
 def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
     """Judge the logarithms of the ratios of the way by the velocity to the way by the fixes, shape (n,)."""
     middle = quantile(ratios, 0.5)
-    spread = 1.4826 * quantile(np.abs(ratios - middle), 0.5)
+    spread = MAD_TO_STD * quantile(np.abs(ratios - middle), 0.5)
     ratio = float(np.exp(middle))
     # the windows overlap: a quarter of them is independent
     std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
@@ -155,7 +156,7 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, ...], 
     # the circular variance
     astray = 1.0 - abs(mean)
     off = np.angle(unit * np.exp(-1j * angle))
-    own = 1.4826 * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
+    own = MAD_TO_STD * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
     std = float(np.hypot(own, one_sided))
     figures = (
         CheckFigure(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from kempf.flows.jobs.predict_request import Kind, PredictRequest, required
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 from kempf.workbench.web.numbers import number_of
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 #: Manoeuvres that can be predicted.
 MANOEUVRES: tuple[Kind, ...] = get_args(Kind)
 #: Sides of a turn, the usual one first.
-SIDES = ("starboard", "port")
+SIDES: tuple[Side, ...] = get_args(Side)
 #: ships of all models that are drawn one by one, and points of each
 _SHIPS, _POINTS = 24, 120
 

@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, wrapped
 from kempf.workbench.web.draw.svg import drawing, element
 
 _RADIUS_M = 6_371_000.0
@@ -32,7 +32,7 @@ def draw_track(channels: Instruments, manoeuvres: Sequence[tuple[int, int]]) -> 
     middle = float(np.median(latitude.value))
     north = _RADIUS_M * (latitude.value - middle)
     # the shorter way round, so that a track across 180 deg holds together
-    turn = (longitude.value - longitude.value[0] + np.pi) % (2.0 * np.pi) - np.pi
+    turn = wrapped(longitude.value - longitude.value[0])
     east = _RADIUS_M * np.cos(middle) * turn
     scale = min(
         (_WIDTH - 2 * _EDGE) / max(float(np.ptp(east)), 1.0), (_HEIGHT - 2 * _EDGE) / max(float(np.ptp(north)), 1.0)
