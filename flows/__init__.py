@@ -1,6 +1,6 @@
 """Joins pipeline and warehouse into jobs, and the jobs into Prefect flows. Holds no arithmetic.
 
-The jobs are plain functions that a terminal calls at once; only `kempf.flows.fleet.flows` knows Prefect.
+The jobs are plain functions that a terminal calls at once; only `kempf.flows.fleet` knows Prefect.
 """
 
 import os

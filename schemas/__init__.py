@@ -1,1 +1,1 @@
-"""What the data look like: names, units, tables, files. Nothing here acts on data or touches a disk."""
+"""What the data look like: names, units, tables, files. Nothing here touches a disk, but for the catalogue in it."""

@@ -4,42 +4,35 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
+from kempf.schemas.frozen import Frozen
 from kempf.schemas.settings import VARIABLES, LogLevel
 
 
-class Metrics(BaseModel):
+class Metrics(Frozen):
     """Where the figures of a run go, for Prometheus."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     textfile: str | None = Field(default=None, description="folder that node_exporter's textfile collector reads")
     pushgateway: str | None = Field(default=None, description="address of a Pushgateway")
 
 
-class Lineage(BaseModel):
+class Lineage(Frozen):
     """Where the OpenLineage events of a run go."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     url: str | None = Field(default=None, description="address of a server that takes OpenLineage events")
 
 
-class Workbench(BaseModel):
+class Workbench(Frozen):
     """Where the pages are that reports of runs link to."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     url: str | None = Field(default=None, description="address at which `kempf workbench` is served")
 
 
-class Configuration(BaseModel):
+class Configuration(Frozen):
     """The settings; None where nothing is said."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     warehouse: str | None = Field(default=None, description="folder or s3://bucket/prefix where everything is kept")
     inbox: str | None = Field(default=None, description="folder or s3://bucket/prefix where logs arrive")

@@ -1,4 +1,4 @@
-"""Names and words in a sentence."""
+"""Names, words and numbers of things in a sentence."""
 
 from __future__ import annotations
 
@@ -30,6 +30,17 @@ def first_of(names: Sequence[str], most: int) -> str:
     'HEHDT, AGRSA ...'
     """
     return ", ".join(names[:most]) + (" ..." if len(names) > most else "")
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun, which takes an s where they are several or none.
+
+    Examples
+    --------
+    >>> counted(1, "zigzag"), counted(2, "zigzag"), counted(0, "zigzag")
+    ('1 zigzag', '2 zigzags', '0 zigzags')
+    """
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def at_the_beginning(words: str) -> str:

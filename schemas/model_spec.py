@@ -6,7 +6,9 @@ import hashlib
 import json
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from kempf.schemas.frozen import Frozen
 
 #: The six parameters of eq. (16) and their units.
 HULL_PARAMETERS: dict[str, str] = {
@@ -17,6 +19,8 @@ HULL_PARAMETERS: dict[str, str] = {
     "b1": "1/m",
     "b2": "1/m^2",
 }
+#: How many there are: they stand first wherever parameters are one vector.
+N_HULL = len(HULL_PARAMETERS)
 
 #: Noise levels of eqs. (16) and (18) that are estimated with them, and their units (continuous time, standard
 #: deviations): wind force, yaw acceleration beside it, unaccounted current, lateral speed, yaw rate, heading. Those of
@@ -32,14 +36,12 @@ NOISE_PARAMETERS: dict[str, str] = {
 }
 
 
-class ModelSpec(BaseModel):
+class ModelSpec(Frozen):
     """Which model is fitted: base, effects in order, disturbance model.
 
     The correlation rates of the Gauss-Markov disturbances are stated, not estimated: one zigzag holds too few of their
     correlation times to determine them.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str = "plain"
     base: str = "sway-yaw-16"

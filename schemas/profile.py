@@ -27,7 +27,8 @@ from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
 from kempf.schemas.frozen import Frozen
-from kempf.schemas.units import factor_to_si
+from kempf.schemas.side import Side
+from kempf.schemas.units import SECOND_NS, factor_to_si
 
 #: From here on spreadsheets count days, those of old Macintosh computers from the second.
 _SPREADSHEETS = (datetime(1899, 12, 30, tzinfo=UTC), datetime(1904, 1, 1, tzinfo=UTC))
@@ -54,7 +55,7 @@ class ChannelMap(Frozen):
     channel: str
     unit: str
     #: which side counts as positive in the log; ``port`` turns the sign
-    positive: Literal["starboard", "port"] = "starboard"
+    positive: Side = "starboard"
     #: added after the sign is turned, in ``unit``: a known mounting or index error
     offset: float = 0.0
     #: factor on the reading, before the offset: an instrument that is known to read so much too little
@@ -328,4 +329,4 @@ def overlay(below: VesselProfile, above: VesselProfile) -> VesselProfile:
 def start_ns(start: datetime) -> int:
     """Return a zoned datetime as UTC nanoseconds, without rounding through a float."""
     whole = int(start.replace(microsecond=0).timestamp())
-    return whole * 1_000_000_000 + start.microsecond * 1_000
+    return whole * SECOND_NS + start.microsecond * 1_000

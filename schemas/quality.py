@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
+from kempf.schemas.frozen import Frozen
 
 #: What a finding is of, one and several.
 FINDINGS = {
@@ -24,10 +25,8 @@ FINDINGS = {
 Kind = Literal["not_converged", "no_shared_hull", "left_out", "no_zigzag", "missing_channels", "channels"]
 
 
-class Limits(BaseModel):
+class Limits(Frozen):
     """How many findings of a kind one vessel may have; null is any number."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     not_converged: int | None = Field(default=None, ge=0)
     no_shared_hull: int | None = Field(default=None, ge=0)

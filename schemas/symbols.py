@@ -79,3 +79,5 @@ SYMBOLS: tuple[str, ...] = (
     *CHANNEL_SYMBOLS,
     *RUN_SYMBOLS,
 )
+#: Place of each symbol among them.
+INDEX: dict[str, int] = {name: i for i, name in enumerate(SYMBOLS)}

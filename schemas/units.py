@@ -1,6 +1,6 @@
-"""Units a log may be written in, each as a factor and an offset to SI.
+"""Units a log may be written in, each as a factor to SI, and those of instants, which are whole nanoseconds.
 
-A unit is always named by the profile or fixed by the standard of the message: none is guessed from the values.
+A unit of a log is always named by the profile or fixed by the standard of the message: none is guessed from the values.
 """
 
 from __future__ import annotations
@@ -8,6 +8,11 @@ from __future__ import annotations
 from math import pi
 
 from kempf.schemas.errors import UsageError
+
+#: Nanoseconds in a millisecond, a second and a day (without a leap second).
+MILLISECOND_NS = 1_000_000
+SECOND_NS = 1_000_000_000
+DAY_NS = 86_400 * SECOND_NS
 
 #: unit -> (SI unit, factor): value_SI = value * factor
 TO_SI: dict[str, tuple[str, float]] = {

@@ -179,7 +179,7 @@ def test_only_the_fleet_knows_prefect():
         ("pipeline/predict/a.py", "from kempf.pipeline import diagnose"),
         ("pipeline/predict/a.py", "from kempf.pipeline.compare.misfit import where"),
         ("pipeline/compare/a.py", "from kempf.pipeline.diagnose.diagnosis import Diagnosis"),
-        ("pipeline/channels/a.py", "from kempf.pipeline.segment.find import find_manoeuvres"),
+        ("pipeline/channels/a.py", "from kempf.pipeline.segment.find_zigzags import find_zigzags"),
         ("warehouse/a.py", "from kempf.flows.jobs import files"),
         ("warehouse/a.py", "from kempf.pipeline.estimate import estimators"),
         ("warehouse/a.py", "import kempf.workbench"),
@@ -203,7 +203,7 @@ def test_the_checker_catches_a_violation(path, source):
         ("flows/fleet/flows.py", "from prefect import flow"),
         ("warehouse/a.py", "from kempf.pipeline.ingest.readings import Readings\nimport deltalake"),
         ("pipeline/simulate/a.py", "from kempf.pipeline.simulate.trial import Trial\nimport numpy"),
-        ("pipeline/estimate/a.py", "from kempf.pipeline.segment.find import find_manoeuvres"),
+        ("pipeline/estimate/a.py", "from kempf.pipeline.segment.find_zigzags import find_zigzags"),
     ],
 )
 def test_the_checker_lets_good_imports_pass(path, source):

@@ -49,8 +49,8 @@ STAGES: dict[Stage, Entry] = {
     "segment": Entry(
         (
             *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
-            *("channels.doctor.refused", "channels.doctor.verdict", "segment.find", "segment.find_turning"),
-            "segment.random_manoeuvre",
+            *("channels.doctor.refused", "channels.doctor.verdict"),
+            *("segment.find_zigzags", "segment.find_circles_and_spirals", "segment.random_manoeuvre"),
             *("segment.by_hand", "segment.corrections", "segment.imo", "segment.imo_turning", "segment.lateral"),
             "estimate.no_log.companions",
         ),

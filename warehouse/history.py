@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cache, partial
 from math import isfinite
-from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import KempfError, UsageError
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import delta, examinations, notes, vessels
 from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.notes import Note
 from kempf.warehouse.parameter_set import UPDATES, Bounds, Update, update_in
-from kempf.warehouse.remembered import remembered
+from kempf.warehouse.query_cache import cached
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -30,10 +30,6 @@ if TYPE_CHECKING:
     from deltalake import DeltaTable
 
     from kempf.warehouse.segments import Segment
-
-
-#: Half a 95 % interval, in standard errors.
-_HALF_WIDTH = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +59,7 @@ class History:
 
 
 def _interval(value: float, std: float | None) -> dict[str, float | None]:
-    half = None if std is None else _HALF_WIDTH * std
+    half = None if std is None else NORMAL_95 * std
     return {"low": None if half is None else value - half, "high": None if half is None else value + half}
 
 
@@ -152,7 +148,7 @@ def standing(warehouse: Warehouse, vessel: str) -> list[str]:
     """
     warehouse.require()
     code = code_of(warehouse, "estimate")
-    return list(remembered(warehouse, _READ, ("standing", vessel, code), partial(_standing, warehouse, vessel)))
+    return list(cached(warehouse, _READ, ("standing", vessel, code), partial(_standing, warehouse, vessel)))
 
 
 #: tables of which it depends what of a vessel is superseded

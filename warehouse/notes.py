@@ -8,8 +8,8 @@ from datetime import datetime
 from typing import Any, Literal, Protocol
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import append_only, delta
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from math import hypot, nan
 from typing import Any
 
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse.canonical import canonical_json, plain, sha256
-from kempf.warehouse.instant import iso_utc
 
 _CONTENTS = ("model_spec", "settings", "fit", "iterations", "convergence", "provenance")
 _SEQUENCES = ("segment_ids", "log_ids", "parameters", "discrete", "noise", "covariance_names", "warnings")

@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
+from kempf.schemas.instants import month_of
 from kempf.warehouse import delta, logs
-from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import one_of, vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.retry import with_retry

@@ -10,9 +10,9 @@ from typing import Any
 from orjson import loads
 
 from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import delta, logs, vessels
 from kempf.warehouse.canonical import canonical_json, plain, sha256
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import one_of, vessel_key
 from kempf.warehouse.query_cache import cached
 from kempf.warehouse.retry import with_retry

@@ -16,11 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.compare.run_series import first_heading, instants_utc_ns
-from kempf.pipeline.predict.prediction import WIDTH_95, Predicted
+from kempf.pipeline.predict.prediction import Predicted
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.enumeration import as_words
+from kempf.schemas.units import SECOND_NS
 
 #: written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone
 _LIBRARY = "kempf"
@@ -180,7 +182,7 @@ def _predicted(
     columns = {field: _shown(factor * prediction.predicted[:, column], first_rad)}
     properties = {field: f"predicted {words}, {as_words(horizon)}"}
     if np.isfinite(prediction.std[:, column]).any():
-        half = WIDTH_95 * factor * prediction.std[:, column]
+        half = NORMAL_95 * factor * prediction.std[:, column]
         columns |= {"low_95": columns[field] - half, "high_95": columns[field] + half}
         properties |= {"low_95": "lower end of the 95 % interval", "high_95": "upper end of the 95 % interval"}
     topic = _Topic(f"/predicted/{horizon}/{name}", f"kempf.{horizon}.{name}", properties)

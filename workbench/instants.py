@@ -6,8 +6,8 @@ import re
 from datetime import UTC, datetime, timedelta
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.units import DAY_NS, SECOND_NS
 
-_SECOND_NS = 1_000_000_000
 #: a fraction of a second, which datetime cuts to microseconds
 _FRACTION = re.compile(r"(?<=:\d\d)[.,](\d{1,9})")
 _DATE = re.compile(r"\d{4}-?\d{2}-?\d{2}")
@@ -66,4 +66,4 @@ def utc_ns_of(text: str, option: str) -> int:
     behind = 0 if fraction is None else int(fraction.group(1).ljust(9, "0"))
     # in whole numbers: a second of today in nanoseconds is more than a float holds
     since = whole - datetime(1970, 1, 1, tzinfo=UTC)
-    return (since.days * 86_400 + since.seconds) * _SECOND_NS + since.microseconds * 1000 + behind
+    return since.days * DAY_NS + since.seconds * SECOND_NS + since.microseconds * 1000 + behind

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.terminal import one_line
 
 #: how many are shown unless all are asked for
@@ -71,7 +72,7 @@ def show_warnings(warnings: Sequence[str], *, verbose: bool, word: str = "warnin
         click.echo(f"  {word}: {one_line(warning)[:600]}")
     more = 0 if verbose else len(ranked(warnings)) - len(shown)
     if more:
-        click.echo(f"  {more} more {word}{'s' if more > 1 else ''}: --verbose")
+        click.echo(f"  {counted(more, f'more {word}')}: --verbose")
 
 
 def of_several(notes: Mapping[str, Sequence[str]]) -> list[str]:

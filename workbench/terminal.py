@@ -121,11 +121,6 @@ def _is_number(text: str) -> bool:
     return text.strip("+-").replace(".", "", 1).replace("e-", "", 1).replace("e+", "", 1).isdigit() or text in ("", "-")
 
 
-def counted(number_of: int, noun: str) -> str:
-    """Return a number with its noun, such as ``1 zigzag`` or ``2 zigzags``."""
-    return f"{number_of} {noun}{'' if number_of == 1 else 's'}"
-
-
 def _logged(done: int, total: int, what: str) -> None:
     _log.info("%s (%d of %d)", what, done, total)
 

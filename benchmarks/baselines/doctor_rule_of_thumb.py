@@ -8,7 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.doctor.log import Log, turning
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: What looks wrong to the eye.
 _ALIKE, _ANGLE_RAD, _TOGETHER = (0.7, 1.4), float(np.deg2rad(15.0)), 0.3

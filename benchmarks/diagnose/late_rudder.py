@@ -17,10 +17,10 @@ import yaml
 
 from benchmarks.diagnose.hidden_effects import programme, readings, sail
 from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
-from kempf.pipeline.simulate.instruments import SECOND_NS
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import Trial, TrialSettings
+from kempf.schemas.units import SECOND_NS
 
 VESSEL, LAG_S = "late", 2.0
 _SEED, _ZIGZAGS, _AFTER_S = 3, 3, 30.0

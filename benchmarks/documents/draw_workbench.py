@@ -15,7 +15,7 @@ from playwright.sync_api import Page
 from benchmarks.diagnose import late_rudder
 from benchmarks.documents import new_rudder
 from benchmarks.pages.browser import KEMPF, Opened, opened
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
 

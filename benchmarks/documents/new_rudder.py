@@ -7,10 +7,10 @@ from pathlib import Path
 
 import yaml
 
-from kempf.pipeline.simulate.instruments import SECOND_NS
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.schemas.units import SECOND_NS
 
 VESSEL, LARGER = "refitted", 1.12
 #: zigzags, and how many of them before she is docked

@@ -22,9 +22,9 @@ import polars as pl
 import yaml
 
 from kempf.schemas.errors import KempfError
+from kempf.schemas.instants import iso_utc
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, compaction, logs, notes, parameter_sets, purges, segments, vessels
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 

@@ -22,7 +22,7 @@ from scipy.stats import beta
 from benchmarks.identify.draw_changes import draw_changes
 from benchmarks.result_page import RESULTS, table, write
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.history.changes import find_changes
@@ -32,6 +32,7 @@ from kempf.pipeline.history.settings import ChangeSettings
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 NAMES = tuple(HULL_PARAMETERS)
 SETTINGS = ChangeSettings()

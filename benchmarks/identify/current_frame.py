@@ -19,12 +19,12 @@ import numpy as np
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.pipeline.ingest.read import read_log
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from tests.reading import read_log
 
 MODES = ("earth", "lateral")
 RESULTS = Path(__file__).parents[1] / "results" / "current_frame.md"
@@ -45,7 +45,7 @@ def run(seed: int) -> list[Errors]:
     settings = zigzag_settings("mariner", seed=seed)
     trial = simulate_trial(settings)
     instruments = from_readings(read_log("trial.nmea", to_nmea(trial), logger_profile(settings)).frame)
-    (zigzag,) = find_manoeuvres(
+    (zigzag,) = find_zigzags(
         instruments.series["heading"],
         instruments.series["rudder_angle"],
         instruments.series["speed_through_water"],

@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.identify.linear_ahead import Ahead
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.predict.prediction import WIDTH_95
+from kempf.schemas.confidence import NORMAL_95
 
 _SHOWN = (
     (2, np.rad2deg(1.0), "heading from its first value, deg"),
@@ -29,7 +29,7 @@ def draw_predicted(record: Record, ahead: Ahead, path: Path) -> None:
         good = np.isfinite(ahead.error[:, column])
         time, measured = record.time_s[good], scale * record.measured[good, column]
         predicted = measured - scale * ahead.error[good, column]
-        reach = WIDTH_95 * scale * ahead.std[good, column]
+        reach = NORMAL_95 * scale * ahead.std[good, column]
         # a window is predicted from one beginning: between windows the line breaks
         ends = np.flatnonzero(np.diff(time) > 0.4 * ahead.horizon_s)
         for part in np.split(np.arange(time.size), ends + 1):

@@ -1,4 +1,4 @@
-"""Draw rudder and heading of the measured logs with what `find_manoeuvres` found in them, one picture a source.
+"""Draw rudder and heading of the measured logs with what `find_zigzags` found in them, one picture a source.
 
 Run from the repository: ``python -m benchmarks.identify.draw_zigzags FOLDER``. Executes are vertical lines,
 overshoots dots, the base heading a dashed line, phases the strip below. For the eye before the numbers are believed.
@@ -15,7 +15,7 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.zigzag import Zigzag
 from tests.segment.loading import available, load
 
@@ -41,7 +41,7 @@ def draw(axes, name: str) -> None:  # type: ignore[no-untyped-def]
     heading = np.rad2deg(log.heading.value - zero)
     axes.plot(log.heading.seconds_since(origin), heading, lw=0.8, color="tab:blue")
     axes.plot(log.rudder.seconds_since(origin), np.rad2deg(log.rudder.value), lw=0.8, color="tab:orange")
-    found = find_manoeuvres(log.heading, log.rudder, log.speed)
+    found = find_zigzags(log.heading, log.rudder, log.speed)
     for zigzag in found:
         seconds = log.heading.seconds_since(origin)
         mark(axes, zigzag, origin=origin, zero_deg=float(np.rad2deg(zero)), heading=heading, seconds=seconds)

@@ -27,7 +27,7 @@ from benchmarks import result_page
 from benchmarks.baselines import vessel_models
 from benchmarks.identify.draw_estimator_speed import draw
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -38,6 +38,7 @@ from kempf.pipeline.estimate.search.starts import starting_points
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 HULLS = ("mariner", "ferry", "container", "tanker")
 SEEDS = (1, 2, 3)

@@ -25,7 +25,7 @@ from benchmarks import result_page
 from benchmarks.baselines.estimators import default_settings, estimate
 from benchmarks.identify.draw_estimators import draw
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
@@ -33,6 +33,7 @@ from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 HULLS = ("mariner", "ferry")
 LEVELS = (0.0, 0.25, 0.5, 1.0, 2.0, 4.0)

@@ -28,7 +28,7 @@ from benchmarks.identify.information_bound import information_at
 from benchmarks.identify.information_page import write_page
 from benchmarks.identify.information_result import Case, Run
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
@@ -45,6 +45,7 @@ from kempf.pipeline.simulate.trial import (
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 SCALES = (0.3, 1.0, 3.0)
 VELOCITY, YAW_RATE, HEADING, RUDDER, LOG = 0.05, radians(0.03), radians(0.05), radians(0.1), 0.05

@@ -10,9 +10,7 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.uncertainty import from_information
-
-#: half width of a 95 % interval in standard errors
-_95 = 1.959963984540054
+from kempf.schemas.confidence import NORMAL_95
 
 
 @dataclass(frozen=True)
@@ -85,7 +83,7 @@ class Cell:
     @property
     def covered(self) -> Float:
         """Share of the runs whose 95 % interval holds the truth, shape (6,)."""
-        share: Float = np.mean(np.abs(self.z) <= _95, axis=0)
+        share: Float = np.mean(np.abs(self.z) <= NORMAL_95, axis=0)
         return share
 
 

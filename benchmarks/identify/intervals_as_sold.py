@@ -29,13 +29,12 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.random_streams import stream
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 
 #: kinds of sets by their name on the page
 KINDS = {"alone": "one zigzag", "pooled": "pooled"}
-#: of a normal distribution
-_HALF_WIDTH = 1.959964
 _SEED = 20261124
 _COUNT = 24
 #: of ships with replacement
@@ -124,7 +123,7 @@ def page(errors: Sequence[Error], count: int) -> list[str]:
 def _inside(errors: Sequence[Error]) -> str:
     z = np.concatenate([e.errors for e in errors]) if errors else np.array([])
     z = z[np.isfinite(z)]
-    return f"{100 * np.mean(np.abs(z) < _HALF_WIDTH):.0f} %" if z.size else ""
+    return f"{100 * np.mean(np.abs(z) < NORMAL_95):.0f} %" if z.size else ""
 
 
 def _by_ship(errors: Sequence[Error]) -> str:
@@ -140,7 +139,7 @@ def _by_ship(errors: Sequence[Error]) -> str:
     held, count = np.zeros(len(numbers)), np.zeros(len(numbers))
     for e in errors:
         z = e.errors[np.isfinite(e.errors)]
-        held[numbers.index(e.number)] += np.count_nonzero(np.abs(z) < _HALF_WIDTH)
+        held[numbers.index(e.number)] += np.count_nonzero(np.abs(z) < NORMAL_95)
         count[numbers.index(e.number)] += z.size
     drawn = stream(_SEED, "ships drawn").integers(0, len(numbers), (_DRAWS, len(numbers)))
     low, high = 100.0 * np.quantile(held[drawn].sum(axis=1) / count[drawn].sum(axis=1), [0.025, 0.975])

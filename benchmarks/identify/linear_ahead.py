@@ -9,7 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.record.record import MEASUREMENTS
-from kempf.pipeline.predict.prediction import WIDTH_95
+from kempf.schemas.confidence import NORMAL_95
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Ahead:
         for i, name in enumerate(MEASUREMENTS):
             good = np.isfinite(self.error[:, i])
             if good.any():
-                within = np.abs(self.error[good, i]) < WIDTH_95 * self.std[good, i]
+                within = np.abs(self.error[good, i]) < NORMAL_95 * self.std[good, i]
                 found[name] = (int(np.count_nonzero(within)), int(np.count_nonzero(good)))
         return found
 

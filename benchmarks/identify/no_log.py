@@ -29,7 +29,7 @@ from benchmarks import result_page
 from benchmarks.identify import no_log_fleet
 from benchmarks.identify.no_log_fleet import Found
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings, identify_without_log
 from kempf.pipeline.estimate.record.cut import make_record
@@ -44,6 +44,7 @@ from kempf.pipeline.simulate.programme import GRID_S
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 SHIPS = ("mariner", "container", "tanker", "ferry")
 CURRENTS = (0.0, 0.3, 0.6)

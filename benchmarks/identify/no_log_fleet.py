@@ -18,9 +18,9 @@ from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, sh
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings, identify_without_log
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.ingest.read import read_log
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.schemas.model_spec import ModelSpec
+from tests.reading import read_log
 
 WAYS = {
     "sure": "no log, the hull taken at its word (`hull_misfit` 0)",
@@ -65,7 +65,7 @@ def zigzags(data: Path, days: int = 2) -> list[Zigzag]:
             instruments = from_readings(read_log(path.name, path.read_bytes(), profile).frame)
             series = instruments.series
             blind = replace(instruments, series={n: s for n, s in series.items() if n != "speed_through_water"})
-            for z in find_manoeuvres(series["heading"], series["rudder_angle"], series["speed_through_water"]):
+            for z in find_zigzags(series["heading"], series["rudder_angle"], series["speed_through_water"]):
                 records = (make_record(i, z.start_utc_ns, z.end_utc_ns) for i in (instruments, blind))
                 arm, speed = profile.wind_arm_per_m or 0.0, profile.trial_speed_m_s
                 bounds = z.start_utc_ns, z.end_utc_ns

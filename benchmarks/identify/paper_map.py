@@ -18,20 +18,21 @@ import numpy as np
 from benchmarks import result_page
 from benchmarks.identify.draw_paper_map import draw_paper_map
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.paper import ship
 from kempf.pipeline.estimate.paper.least_squares import regress
 from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedureSettings, iterate
+from kempf.pipeline.estimate.paper.vehicle import LinearVehicle
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discrete_from_continuous
-from kempf.pipeline.model.vehicle import LinearVehicle
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.instruments import Instrument
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.schemas.units import SECOND_NS
 
 NOISES = (1e-4, 1e-3, 1e-2, 0.03, 0.1, 0.3, 1.0)
 VARIABILITIES = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0)

@@ -28,11 +28,10 @@ from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.predict.free_run import free_run_of
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import HULL_PARAMETERS
 
-#: standard errors to either side of a 95 % interval
-_WIDE = 1.96
 _SHIPS, _CLOCKS = 40, tuple(one.name for one in fields(InstantErrors))
 
 
@@ -108,7 +107,7 @@ def page(ships: Sequence[tuple[Outcome, Float]], others: Sequence[Outcome]) -> l
     }
     head = ["instants", *HULL_PARAMETERS, "all"]
     inside = [
-        [name, *(f"{100.0 * np.mean(part):.0f} %" for part in (*(np.abs(x) < _WIDE).T, np.abs(x) < _WIDE))]
+        [name, *(f"{100.0 * np.mean(part):.0f} %" for part in (*(np.abs(x) < NORMAL_95).T, np.abs(x) < NORMAL_95))]
         for name, x in off.items()
     ]
     rms = [[name, *(f"{100.0 * x:.2f} %" for x in np.sqrt(np.mean(x**2, axis=0)))] for name, x in error.items()]

@@ -10,8 +10,9 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import SECOND_NS
 
 _FASTEST = 0.015
 _CIRCLE = ("heading", "course_over_ground")

@@ -14,7 +14,6 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.hulls import HULLS
@@ -32,6 +31,7 @@ from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 #: Of the eight trial ships one capsizes in the simulation, at tens of metres a second and thousands of degrees of roll:
 #: her logs are not sound ones.

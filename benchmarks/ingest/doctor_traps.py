@@ -13,8 +13,8 @@ from benchmarks import measured_ships
 from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import VesselProfile, parse
+from tests.reading import read_log
 
 
 @dataclass(frozen=True)

@@ -89,8 +89,8 @@ def mcap_ros2(path: Path) -> int:
 def whole_reading(path: Path) -> int:
     """Read a log as `kempf ingest` does: decoded, checked, as a table, with its ledger."""
     from kempf.pipeline.ingest.log_file import LogFile
-    from kempf.pipeline.ingest.read import read_log
     from kempf.schemas.profile import VesselProfile
+    from tests.reading import read_log
 
     profile = VesselProfile.model_validate({"sources": [{"match": "*", "channels": CHANNELS}]})
     with path.open("rb") as stream:

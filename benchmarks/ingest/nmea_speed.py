@@ -20,8 +20,8 @@ import zstandard
 from benchmarks.ingest.mixed_nmea import DRESSES, mixed_log
 from benchmarks.result_page import DATA, RESULTS, table, write
 from kempf.pipeline.ingest.nmea.decode import decode
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 #: Seconds on the wall and of the processor.
 Spent = tuple[float, float]

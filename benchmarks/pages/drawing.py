@@ -22,7 +22,8 @@ from playwright.sync_api import Page
 
 from benchmarks import result_page
 from benchmarks.pages.browser import FIRST_PAINT_AND_SERIES, KEMPF, Opened, opened
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.charts.bins import reduced
 
 _ROWS, _RATE_HZ, _REPEATS = 36_000, 10, 15

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.inbox import InboxFile
 
@@ -41,7 +42,7 @@ def sentence(outcomes: Sequence[dict[str, Any]]) -> str:
     """
     counts = Counter(str(outcome["outcome"]) for outcome in outcomes)
     tally = ", ".join(f"{count} {kind}" for kind, count in sorted(counts.items()))
-    return f"{len(outcomes)} log{'' if len(outcomes) == 1 else 's'}: {tally}" if outcomes else "no log is new"
+    return f"{counted(len(outcomes), 'log')}: {tally}" if outcomes else "no log is new"
 
 
 def in_quarantine(file: InboxFile) -> dict[str, Any]:

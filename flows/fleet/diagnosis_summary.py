@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 
 
 def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

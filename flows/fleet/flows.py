@@ -41,10 +41,10 @@ from kempf.flows.jobs.vessel_state import responsible_code
 from kempf.flows.process.configuration import setting
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
+from kempf.schemas.instants import iso_utc
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.quality import NO_LIMITS
 from kempf.warehouse import vessels as vessel_table
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse

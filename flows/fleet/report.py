@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality, in_words
 from kempf.warehouse.keys import segment_of_address
@@ -75,15 +76,15 @@ def sentence(reports: Reports, quality: Quality = NO_LIMITS) -> str:
     '1 vessel: 1 changed'
     """
     counts = Counter(str(report["status"]) for report in reports)
-    counted = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+    by_status = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     names = [str(report["vessel"]) for report in reports if alarming(report)]
     woken = f"; look at {', '.join(names[:5])}{' ...' if names[5:] else ''}" if names else ""
     known = sum(1 for report in reports if report["failures"] and not alarming(report))
     bad = [str(report["vessel"]) for report in reports if beyond(report, quality)]
     poor = f"; {len(bad)} beyond the limits of quality: {', '.join(bad[:5])}{' ...' if bad[5:] else ''}" if bad else ""
     before = f" ({known} as the run before)" if known else ""
-    vessels = f"{len(reports)} vessel{'' if len(reports) == 1 else 's'}"
-    return f"{vessels}: {counted or 'none'}{before}{woken}{poor}"
+    vessels = counted(len(reports), "vessel")
+    return f"{vessels}: {by_status or 'none'}{before}{woken}{poor}"
 
 
 def table(reports: Reports) -> list[dict[str, Any]]:
@@ -93,13 +94,13 @@ def table(reports: Reports) -> list[dict[str, Any]]:
         {
             **{k: v for k, v in report.items() if k not in ("failures", "verified", "findings")},
             "failures": "; ".join(f"{f['what']}: {f['error']['message']}" for f in report["failures"]),
-            "findings": counted(report),
+            "findings": findings_in_words(report),
         }
         for report in shown
     ]
 
 
-def counted(report: Mapping[str, Any]) -> str:
+def findings_in_words(report: Mapping[str, Any]) -> str:
     """Return how many findings of each kind a vessel has, in words."""
     return _in_words(_counts([report]))
 

@@ -20,7 +20,8 @@ from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
-#: standard errors beyond which a prediction is worse, and part of the misfit: `kempf.pipeline.diagnose.matters`
+#: standard errors beyond which a prediction is worse, and part of the misfit:
+#: `kempf.pipeline.diagnose.improves_prediction`
 WORSE, LEAST_RISE = 2.0, 0.01
 
 

@@ -19,21 +19,21 @@ from kempf.flows.jobs.spiral_ways import orders_of
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.manoeuvre.began import Began, began
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.filtered_beginning import start_of, steady_wind, usual_force
+from kempf.pipeline.manoeuvre.initial_conditions import InitialConditions, initial_conditions
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse import notes
 from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment
@@ -49,7 +49,7 @@ class AsSailed:
     manoeuvre: Manoeuvre
     speed_m_s: float
     #: The wind counted from the course of the approach.
-    began: Began
+    initial: InitialConditions
     #: Steady wind force and its standard error: of a zigzag as the filter finds it; of what no filter passes, none
     #: with the size that it has in the zigzags of the set.
     wind_force_m_s2: tuple[float, float]
@@ -61,17 +61,17 @@ class AsSailed:
 
     def on_the_day(self, model: Identified, basis: Basis) -> Identified:
         """Return a model as it was on the day of this manoeuvre."""
-        kept, (ratio, std), shaft = basis.kept_m, basis.surge.settled, self.began.shaft_per_s
+        kept, (ratio, std), shaft = basis.kept_m, basis.surge.settled, self.initial.shaft_per_s
         waters = replace(
             model.waters,
             approach_m_s=self.speed_m_s,
             wind_force_m_s2=self.wind_force_m_s2[0],
             wind_arm_per_m=self.arm_per_m,
-            true_wind_m_s=self.began.wind_m_s,
-            true_wind_from_rad=self.began.wind_from_rad,
-            air=self.began.air,
+            true_wind_m_s=self.initial.wind_m_s,
+            true_wind_from_rad=self.initial.wind_from_rad,
+            air=self.initial.air,
             settled_m_s=None if shaft is None or kept is None else ratio * kept * shaft,
-            start=self.began.start,
+            start=self.initial.start,
             day=model.waters.day if self.load is None else self.load,
         )
         # the gear is that of the logs, whatever other one a prediction was asked for
@@ -79,7 +79,7 @@ class AsSailed:
         return replace(
             own,
             wind_force_std_m_s2=self.wind_force_m_s2[1],
-            start_std=self.began.start_std,
+            start_std=self.initial.start_std,
             settled_std=std / ratio,
         )
 
@@ -118,7 +118,7 @@ def _one(
     speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
     passed = _passed(run, predicted) if run else None
     executes = segment.executes_utc_ns or (segment.start_utc_ns,)
-    beginning = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
+    beginning = initial_conditions(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
     if run is not None:
         start, std = _start(run, passed, segment)
         beginning = replace(beginning, start=start, start_std=replace(std, forward_m_s=beginning.start_std.forward_m_s))
@@ -128,7 +128,7 @@ def _one(
         segment=segment,
         manoeuvre=_as_ordered(manoeuvre, segment),
         speed_m_s=speed_m_s,
-        began=beginning.counted_from(radians(segment.base_heading_deg)),
+        initial=beginning.counted_from(radians(segment.base_heading_deg)),
         wind_force_m_s2=steady_wind(run, passed) if run and passed else without_run,
         arm_per_m=(run.run if run else predicted.basis.runs.runs[0]).ship.arm_per_m,
         sample="fitted" if fitted else "held_out",
@@ -220,7 +220,7 @@ def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
         )
     if isinstance(manoeuvre, Spiral):
         return replace(manoeuvre, rudder_rad=rudder, held_rad=tuple(map(radians, orders_of(segment))))
-    if isinstance(manoeuvre, TurningCircle):
+    if isinstance(manoeuvre, PredictedCircle):
         # the steady figures are means over the last turn: of as many turns as were sailed
         turned = radians(abs(float(segment.detail["heading_change_deg"])))
         return replace(manoeuvre, side=side, rudder_rad=rudder, turn_rad=turned)

@@ -11,18 +11,18 @@ from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
 from kempf.flows.jobs.predicted import Predicted
 from kempf.flows.jobs.spiral_ways import SAME_ORDER_DEG, rates_of
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.manoeuvre.prediction import Figure, predict
+from kempf.pipeline.manoeuvre.prediction import PredictedFigure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import segments
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
-_KINDS: dict[type, str] = {TurningCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
+_KINDS: dict[type, str] = {PredictedCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
 #: ships drawn for each measured manoeuvre
 _DRAWS = 128
 
@@ -36,7 +36,7 @@ class Beside:
     #: measured_low, measured_high: 95 % interval of the measurement, None where it is not known.
     measured_low: float | None
     measured_high: float | None
-    predicted: Figure
+    predicted: PredictedFigure
 
     @property
     def inside(self) -> bool | None:

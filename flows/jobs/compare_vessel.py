@@ -8,7 +8,7 @@ from typing import Any
 
 from kempf.flows.jobs.bound_runs import BoundRuns, bound
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.channels.series import SECOND_NS, Mask
+from kempf.pipeline.channels.series import Mask
 from kempf.pipeline.compare.compared_run import compare_run
 from kempf.pipeline.compare.comparison import FITTED, HELD_OUT, ComparedRun, judged, summary
 from kempf.pipeline.compare.evidence import Evidence
@@ -20,6 +20,7 @@ from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.run_residuals import RunResiduals, phases_s
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse

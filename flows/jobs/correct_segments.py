@@ -19,8 +19,8 @@ from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import aliases, corrections, examinations, logs, segments
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse

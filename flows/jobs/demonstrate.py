@@ -22,9 +22,9 @@ from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, Trial, TrialSetting
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.schemas.profile import VesselProfile
+from kempf.schemas.units import DAY_NS
 from kempf.warehouse.store import Warehouse
 
-_DAY_NS = 86_400_000_000_000
 #: Seed, first day, days between and headings of the three trial days: nothing hangs on them.
 _SEED, _FIRST_NS, _APART = 7, 1_746_252_000_000_000_000, 90
 _DAYS: tuple[tuple[str, Callable[[Trial], bytes], float], ...] = (
@@ -82,7 +82,7 @@ def demonstrate(folder: Path, progress: Progress = silent) -> Demonstration:
             _PROGRAMME,
             PAPER_ENVIRONMENT,
             seed=_SEED + day,
-            start_utc_ns=_FIRST_NS + day * _APART * _DAY_NS,
+            start_utc_ns=_FIRST_NS + day * _APART * DAY_NS,
             heading_deg=heading,
         )
         trials[name] = write(simulate_trial(settings))

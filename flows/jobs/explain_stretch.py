@@ -17,7 +17,7 @@ from kempf.pipeline.diagnose.stretch import Explained, explain
 from kempf.pipeline.diagnose.stretch_json import as_json
 from kempf.pipeline.estimate.pooled_fit import fit
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 

@@ -13,8 +13,8 @@ from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.segment import corrections
 from kempf.pipeline.segment.by_hand import zigzag_between
 from kempf.pipeline.segment.corrections import Marked, Standing
-from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
@@ -22,7 +22,7 @@ from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from kempf.pipeline.segment.spiral import Spiral
-from kempf.pipeline.segment.turning_circle import TurningCircle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
@@ -69,12 +69,12 @@ def find_segments(
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
     standing = corrections.standing(log_corrections)
     marked, notes = corrections.applied(
-        find_manoeuvres(heading, rudder, speed),
+        find_zigzags(heading, rudder, speed),
         standing,
         lambda bounds: zigzag_between(heading, rudder, speed, *bounds),
     )
     manoeuvres = [_marked(marked_zigzag, ingest, profile, instruments) for marked_zigzag in marked]
-    turning = find_turning(instruments, [marked_zigzag.zigzag for marked_zigzag in marked])
+    turning = find_circles_and_spirals(instruments, [marked_zigzag.zigzag for marked_zigzag in marked])
     others = [_kept_aside(manoeuvre, ingest, profile) for manoeuvre in turning]
     spans = [(segment.start_utc_ns, segment.end_utc_ns) for segment in (*manoeuvres, *others)]
     others += [_random(manoeuvre, ingest, profile, instruments) for manoeuvre in find_random(instruments, spans)]
@@ -157,9 +157,9 @@ def _own_time(start_utc_ns: int, ingest: Ingest, profile: VesselProfile) -> bool
     return not stated and start_utc_ns >= CLOCK_FIRST_NS
 
 
-def _kept_aside(manoeuvre: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
+def _kept_aside(manoeuvre: MeasuredCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
     """Return a manoeuvre that no model is fitted to, with its figures."""
-    if isinstance(manoeuvre, TurningCircle):
+    if isinstance(manoeuvre, MeasuredCircle):
         return _turning_circle(manoeuvre, ingest, profile)
     quality = {"reasons": manoeuvre.reasons}
     detail: dict[str, Any] = {
@@ -183,7 +183,7 @@ def _kept_aside(manoeuvre: TurningCircle | PullOut | Spiral, ingest: Ingest, pro
     return _no_zigzag(manoeuvre, ingest, "spiral", executes, quality, detail)
 
 
-def _turning_circle(circle: TurningCircle, ingest: Ingest, profile: VesselProfile) -> Segment:
+def _turning_circle(circle: MeasuredCircle, ingest: Ingest, profile: VesselProfile) -> Segment:
     measurement = circle.measured
     detail = {
         "length_m": profile.length_m,
@@ -206,7 +206,7 @@ def _turning_circle(circle: TurningCircle, ingest: Ingest, profile: VesselProfil
 
 
 def _no_zigzag(
-    manoeuvre: TurningCircle | PullOut | Spiral | RandomManoeuvre,
+    manoeuvre: MeasuredCircle | PullOut | Spiral | RandomManoeuvre,
     ingest: Ingest,
     kind: str,
     executes_utc_ns: tuple[int, ...],

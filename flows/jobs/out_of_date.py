@@ -9,6 +9,7 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from kempf.schemas.enumeration import counted
 from kempf.warehouse import aliases, corrections, examinations, history, logs, parameter_sets, vessels
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.logs import LogRow
@@ -54,7 +55,7 @@ def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:
     if not stale:
         return None
     whose = f" of {next(iter(stale))}" if len(stale) == 1 else f" of {len(stale)} vessels"
-    return f"{_logs(stale.total())}{whose} read {_OLDER}; next: {command_for(stale)}"
+    return f"{counted(stale.total(), 'log')}{whose} read {_OLDER}; next: {command_for(stale)}"
 
 
 def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
@@ -70,7 +71,7 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     stale = _stale(warehouse, vessel).total()
     codes = parameter_sets.codes(warehouse, vessel)
     old = bool(codes) and code_of(warehouse, "estimate") not in codes
-    parts = [f"{_logs(stale)} read"] * bool(stale) + ["parameter sets made"] * old
+    parts = [f"{counted(stale, 'log')} read"] * bool(stale) + ["parameter sets made"] * old
     said = [f"{' and '.join(parts)} {_OLDER}"] if parts else []
     pointed = aliases.of_vessel(warehouse, vessel)
     current, withdrawn = pointed.get(aliases.CURRENT), pointed.get(aliases.WITHDRAWN)
@@ -102,10 +103,6 @@ def _stale(warehouse: Warehouse, vessel: str | None) -> Counter[str]:
     names = {row.ingest_id for row in old}
     old += unsearched(warehouse, [row for row in rows if row.ingest_id not in names])
     return Counter(row.vessel for row in old)
-
-
-def _logs(count: int) -> str:
-    return f"{count} log{'' if count == 1 else 's'}"
 
 
 def command_for(names: Collection[str]) -> str:

@@ -7,9 +7,9 @@ from dataclasses import asdict, dataclass, replace
 from math import inf, isfinite, isnan
 from typing import Any
 
+from kempf.schemas.instants import iso_utc
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.agreement import content_digest
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
 
 

@@ -8,13 +8,13 @@ from math import isfinite, radians
 from typing import TYPE_CHECKING, Literal
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 
 if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
     from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 
 Kind = Literal["turning-circle", "zigzag", "pull-out", "spiral"]
-Side = Literal["starboard", "port"]
 #: rudder of a manoeuvre where none is asked for, deg
 USUAL_RUDDER_DEG: dict[Kind, float] = {"turning-circle": 35.0, "pull-out": 20.0, "spiral": 20.0}
 
@@ -51,7 +51,7 @@ def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
     # the kernels that sail them take a while to load, and whoever only asks does not need them
     from kempf.pipeline.manoeuvre.pull_out import PullOut
     from kempf.pipeline.manoeuvre.spiral import Spiral
-    from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+    from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
     from kempf.pipeline.manoeuvre.zigzag import Zigzag
 
     required(request)
@@ -61,7 +61,7 @@ def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
         return Zigzag(radians(heading), radians(rudder), side)
     angle = _rudder_deg(request)
     if request.kind == "turning-circle":
-        return TurningCircle(radians(angle), side)
+        return PredictedCircle(radians(angle), side)
     return PullOut(radians(angle), side) if request.kind == "pull-out" else Spiral(radians(angle))
 
 

@@ -20,12 +20,12 @@ from kempf.flows.jobs.spool import spooled
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
+from kempf.schemas.instants import month_of
 from kempf.schemas.profile import parse
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import corrections, delta, logs, lost, raw, readings, seals, vessels
 from kempf.warehouse.deposit import describe_all
 from kempf.warehouse.equivalents import code_of, codes_of
-from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.migrations.chain import repair_marker

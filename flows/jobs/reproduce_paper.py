@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.paper import ship as paper
@@ -36,6 +36,7 @@ from kempf.pipeline.simulate.instruments import Instrument
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 Float = NDArray[np.float64]
 

@@ -15,6 +15,7 @@ from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest_log, laid_over
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile, merge
 from kempf.warehouse import code_version, inbox, vessels
@@ -79,7 +80,7 @@ class NeedsAPerson(DataRejected):
 
     def __init__(self, run: InboxRun) -> None:
         names = [PurePosixPath(file.address).name for file in run.quarantined]
-        count = f"{len(names)} file{'s' if len(names) != 1 else ''}"
+        count = counted(len(names), "file")
         super().__init__(
             "files_in_quarantine",
             f"{count} of {run.address} cannot be placed or read: {', '.join(names[:5])}{' ...' if names[5:] else ''}.",

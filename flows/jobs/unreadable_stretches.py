@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from kempf.pipeline.ingest.decoded import LostStretch
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 
 
 def as_json(lost: Sequence[LostStretch]) -> list[dict[str, Any]]:

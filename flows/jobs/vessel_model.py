@@ -38,10 +38,9 @@ from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import common_slip
 from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
-from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
+from kempf.schemas.model_spec import HULL_PARAMETERS, N_HULL, NOISE_PARAMETERS, ModelSpec
 from kempf.schemas.units import as_read
 from kempf.warehouse import parameter_sets, provenance, vessels
 from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id

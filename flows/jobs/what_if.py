@@ -17,10 +17,12 @@ from kempf.flows.jobs.leg_fit import by_name, shown_by_legs
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.run_series import first_heading
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.estimate.sensitivity import Point, passed
-from kempf.pipeline.predict.free_run import CHANNELS, free_run_of
+from kempf.pipeline.predict.free_run import free_run_of
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.schemas.motion_channel import MOTION
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -30,7 +32,6 @@ _SIDE, _STEP = 4, 1.0
 _SHARE = 0.1
 #: of a drawn series
 MOST_INSTANTS = 150
-_UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +45,7 @@ class Tried:
     log_likelihood_falls_by: float
     #: Of the manoeuvre; see `kempf.pipeline.predict.free_run.FreeRun.relative_error`. None where it runs away.
     free_run_error_percent: float | None
-    #: Shape (n, 3). Predicted, columns `kempf.pipeline.predict.free_run.CHANNELS`; NaN where it runs away.
+    #: Shape (n, 3). Predicted, columns `kempf.pipeline.estimate.record.record.MEASUREMENTS`; NaN where it runs away.
     predicted: Float
 
     def as_json(self) -> dict[str, Any]:
@@ -85,12 +86,12 @@ class WhatIf:
         }
 
     def measured(self) -> dict[str, Float]:
-        """Return what was measured, each of shape (n,): seconds, rudder, rad, and `CHANNELS` in SI."""
+        """Return what was measured, each of shape (n,): seconds, rudder, rad, and `MEASUREMENTS` in SI."""
         run = self.run.filtered.run
         zero = first_heading(run)
         shown = {
-            f"{name}_{_UNITS[name]}": run.measured[:, i] + (zero if name == "heading" else 0.0)
-            for i, name in enumerate(CHANNELS)
+            f"{name}_{MOTION[name].suffix}": run.measured[:, i] + (zero if name == "heading" else 0.0)
+            for i, name in enumerate(MEASUREMENTS)
         }
         return {"time_s": run.time_s, "rudder_angle_rad": run.rudder_rad, **shown}
 
@@ -98,8 +99,8 @@ class WhatIf:
         """Return what one value predicts of it, each of shape (n,), as `measured` does."""
         zero = first_heading(self.run.filtered.run)
         return {
-            f"{name}_{_UNITS[name]}": attempt.predicted[:, i] + (zero if name == "heading" else 0.0)
-            for i, name in enumerate(CHANNELS)
+            f"{name}_{MOTION[name].suffix}": attempt.predicted[:, i] + (zero if name == "heading" else 0.0)
+            for i, name in enumerate(MEASUREMENTS)
         }
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: a gear has one rate if so many of its fast intervals, those above half the fastest, agree on it within so much of it
 _AGREE, _WITHIN = 0.6, 0.1

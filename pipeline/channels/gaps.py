@@ -6,8 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series, written
+from kempf.pipeline.channels.series import Nanoseconds, Series
 from kempf.schemas.enumeration import listed
+from kempf.schemas.instants import written
+from kempf.schemas.units import SECOND_NS
 
 #: Shortest gap that is named, s, and in periods of the channel.
 _LEAST_S, _PERIODS = 10.0, 10.0

@@ -10,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: readings of a stand, see `standing.without_noise`, and of a run whose rate is to be its own
 _STAND, _RUN = 3, 4

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Longest distance of two values of the speed, s: a log slower than this changes little in between.
 LONGEST_SPEED_GAP_S = 60.0

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.schemas.units import SECOND_NS
 
 #: fewer runs than this say nothing about an instrument's period
 _MIN_RUNS = 20

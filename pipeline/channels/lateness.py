@@ -13,7 +13,8 @@ import numpy as np
 from kempf.pipeline.channels.doctor.log import Complex, Velocity
 from kempf.pipeline.channels.doctor.robust_regression import fit
 from kempf.pipeline.channels.recursion import filtered
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.schemas.units import SECOND_NS
 
 #: instants that are needed
 _FEWEST = 60

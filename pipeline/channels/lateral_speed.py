@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.robust_std import robust_std
 from kempf.pipeline.channels.rounding import rounding_std
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 
@@ -95,7 +96,7 @@ def noise_std(series: Series) -> float:
     if len(series) < 8:
         return float("nan")
     difference = np.diff(series.value, n=3)
-    white = float(1.4826 * np.median(np.abs(difference - np.median(difference))) / np.sqrt(20.0))
+    white = float(robust_std(difference - np.median(difference)) / np.sqrt(20.0))
     # a coarse channel that moves little repeats itself: its rounding is noise all the same
     return max(white, rounding_std(series))
 

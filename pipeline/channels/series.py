@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.schemas.units import SECOND_NS
+
 Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-SECOND_NS = 1_000_000_000
 
-
-def written(time_utc_ns: int) -> str:
-    """Return an instant to the second, for a sentence.
+def wrapped(angle: Float | float) -> Float:
+    """Return angles, rad, brought into [-pi, pi) by whole turns; of the shape given.
 
     Examples
     --------
-    >>> written(1_746_252_300_640_000_000)
-    '2025-05-03 06:05:00 UTC'
+    >>> wrapped(np.array([0.0, 1.5, -1.5]) * np.pi).tolist() == (np.array([0.0, -0.5, 0.5]) * np.pi).tolist()
+    True
     """
-    return datetime.fromtimestamp(int(time_utc_ns) // SECOND_NS, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

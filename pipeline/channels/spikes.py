@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from kempf.pipeline.channels.robust_std import robust_std
 from kempf.pipeline.channels.series import Series
 
 _FEWEST = 12
@@ -29,6 +30,6 @@ def without_spikes(series: Series) -> tuple[Series, int]:
     centre = np.median(window, axis=1)
     away = np.abs(series.value - centre)
     # the scale of the whole series: the neighbours alone may all be equal in a coarse channel
-    scale = max(1.4826 * float(np.median(away)), 1e-2 * float(np.median(np.abs(series.value))))
+    scale = max(robust_std(away), 1e-2 * float(np.median(np.abs(series.value))))
     keep = away <= _SPIKE * scale
     return Series(series.time_utc_ns[keep], series.value[keep]), int(n - np.count_nonzero(keep))

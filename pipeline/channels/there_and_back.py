@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Series, written
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
+from kempf.pipeline.channels.series import Float, Mask, Series
 from kempf.schemas.channels import CHANNELS
-from kempf.schemas.units import as_read
+from kempf.schemas.instants import written
+from kempf.schemas.units import SECOND_NS, as_read
 
 #: readings on either side of one: a leap of up to so many is none of their median
 _BESIDE = 2
@@ -65,7 +67,7 @@ def leaps(series: Series, name: str) -> Mask:
     if farthest == 0.0 or farthest > float(np.ptp(followed)):
         return found
     usual = _TURN_RAD_S if name == "yaw_rate" else max(_GEAR_RAD, _GEAR_RAD_S * series.period_s)
-    limit = max(farthest, _SPREADS * 1.4826 * float(np.median(away)), usual)
+    limit = max(farthest, _SPREADS * MAD_TO_STD * float(np.median(away)), usual)
     at = np.flatnonzero(away > limit) + _BESIDE
     # across a gap anything may have happened
     step = np.diff(series.time_utc_ns)

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.compare.group import BAND, UNITS
+from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.distributions import beta_quantile, beta_tail
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import RunResiduals
+from kempf.schemas.motion_channel import MOTION
 
 #: edges of the bands, Hz: octaves, so that the waves a ship meets lie within 0.08 to 0.16 Hz
 EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))
@@ -37,7 +38,7 @@ def by_band(residuals: Sequence[RunResiduals]) -> dict[str, list[dict[str, Any]]
         largest, and ``free_run_rms``: the free run's error within the band, in ``unit``.
     """
     by_channel = {}
-    for i, name in enumerate(CHANNELS):
+    for i, name in enumerate(MEASUREMENTS):
         parts = [part for part in (_spectra(run, i) for run in residuals) if part is not None]
         if parts:
             by_channel[name] = _bands(parts, name)
@@ -73,7 +74,7 @@ def _spectra(run: RunResiduals, channel: int) -> _Spectra | None:
 
 
 def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
-    unit, factor = UNITS[name]
+    unit, factor = MOTION[name].shown
     frequency, power, error = (
         np.concatenate([getattr(part, of) for part in parts]) for of in ("frequency", "power", "error")
     )

@@ -8,16 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.compare.overshoot import OvershootError
 from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
 from kempf.pipeline.predict.prediction import Predicted
 from kempf.pipeline.predict.run_residuals import RunResiduals
+from kempf.schemas.motion_channel import MOTION
 
 FITTED, HELD_OUT = "fitted", "held_out"
-#: the order of the command line's JSON
-ORDER = ("yaw_rate", "heading", "lateral_speed")
-_SI = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad"}
 _DEG = float(np.rad2deg(1.0))
 
 
@@ -68,14 +65,15 @@ class ComparedRun:
         """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
         predicted = self.predicted
         rms = predicted.rms()
-        display = {name: {"value": UNITS[name][1] * rms[name], "unit": UNITS[name][0]} for name in ORDER if name in rms}
+        shown = {name: channel.shown for name, channel in MOTION.items() if name in rms}
+        display = {name: {"value": factor * rms[name], "unit": unit} for name, (unit, factor) in shown.items()}
         return {
             "segment_id": self.name,
             "held_out": self.held_out,
             "sample": self.sample,
             "fit_percent": _ordered(predicted.fit_percent()),
             "rms": _ordered(rms),
-            "rms_unit": {name: _SI[name] for name in ORDER if name in rms},
+            "rms_unit": {name: MOTION[name].unit for name in shown},
             "rms_display": display,
             "rms_told": display,  # as it was called up to 0.1
             "n": _ordered(predicted.count()),
@@ -101,7 +99,7 @@ class ComparedRun:
 
 
 def _ordered(by_channel: dict[str, Any]) -> dict[str, Any]:
-    return {name: by_channel[name] for name in ORDER if name in by_channel}
+    return {name: by_channel[name] for name in MOTION if name in by_channel}
 
 
 def _started_from(run: ComparedRun) -> dict[str, Any]:
@@ -158,7 +156,7 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     fits = [run.predicted.fit_percent() for run in runs]
     rms = [run.predicted.rms() for run in runs]
     inside = [run.predicted.inside_95() for run in runs]
-    there = [name for name in ORDER if any(name in fit for fit in fits)]
+    there = [name for name in MOTION if any(name in fit for fit in fits)]
     covered = {}
     for name in there:
         counts = [by_channel[name] for by_channel in inside if name in by_channel]
@@ -167,8 +165,8 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             covered[name] = {"share": k / n, "inside": k, "of": n}
     display = {
         name: {
-            **_mean([UNITS[name][1] * by_channel[name] for by_channel in rms if name in by_channel]),
-            "unit": UNITS[name][0],
+            **_mean([MOTION[name].shown[1] * by_channel[name] for by_channel in rms if name in by_channel]),
+            "unit": MOTION[name].shown[0],
         }
         for name in there
     }

@@ -12,16 +12,15 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.compare.group import BAND
-from kempf.pipeline.distributions import chi2_tail, normal_quantile, normal_up_to
+from kempf.pipeline.compare.group import BAND, TWO_SIDED
+from kempf.pipeline.distributions import chi2_tail, normal_up_to
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import RunResiduals
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: lags go up to this time, and to so many steps at most
 _LONGEST_S, _MOST = 60.0, 120
-_WIDTH = float(normal_quantile(0.5 + BAND / 2.0))
 #: pairs below which a lag is left out
 _FEWEST_PAIRS = 20
 
@@ -44,7 +43,7 @@ def correlations(residuals: Sequence[RunResiduals]) -> dict[str, Any]:
     given = [given_to(run.filtered.run) for run in residuals]
     names = [name for name in given[0] if all(name in series for series in given)]
     by_channel: dict[str, Any] = {}
-    for i, channel in enumerate(CHANNELS):
+    for i, channel in enumerate(MEASUREMENTS):
         z = [run.whitened[:, i] for run in residuals]
         if sum(int(np.count_nonzero(np.isfinite(column))) for column in z) < _FEWEST_PAIRS:
             continue
@@ -105,8 +104,8 @@ def _summary(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
     return {
         "lag_s": lag_s.tolist(),
         "rho": rho.tolist(),
-        "band": _WIDTH / float(np.sqrt(np.median(pairs))),
-        "outside": int(np.count_nonzero(np.abs(rho) * np.sqrt(pairs) > _WIDTH)),
+        "band": TWO_SIDED / float(np.sqrt(np.median(pairs))),
+        "outside": int(np.count_nonzero(np.abs(rho) * np.sqrt(pairs) > TWO_SIDED)),
         "expected_outside": (1.0 - BAND) * rho.size,
         "largest": float(rho[at]),
         "largest_lag_s": float(lag_s[at]),

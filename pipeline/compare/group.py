@@ -13,18 +13,14 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.distributions import chi2_quantile, normal_quantile
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import Samples
+from kempf.schemas.motion_channel import MOTION
 
 #: probability of the bands
 BAND = 0.99
-#: unit and factor from SI in which errors are shown
-UNITS: dict[str, tuple[str, float]] = {
-    "lateral_speed": ("m/s", 1.0),
-    "yaw_rate": ("deg/s", float(np.rad2deg(1.0))),
-    "heading": ("deg", float(np.rad2deg(1.0))),
-}
-_TWO_SIDED = float(normal_quantile(0.5 + BAND / 2.0))
+#: half the width of such a band about a normal number, in standard deviations
+TWO_SIDED = float(normal_quantile(0.5 + BAND / 2.0))
 
 
 def rms_band(n: int) -> tuple[float, float]:
@@ -55,16 +51,16 @@ def group(samples: Samples, inside: NDArray[np.bool_]) -> dict[str, Any]:
     """
     whitened, free = samples.whitened[inside], samples.free_error[inside]
     channels = {}
-    for i, name in enumerate(CHANNELS):
+    for i, name in enumerate(MEASUREMENTS):
         if not np.isfinite(samples.whitened[:, i]).any() and not np.isfinite(samples.free_error[:, i]).any():
             continue
-        unit, factor = UNITS[name]
+        unit, factor = MOTION[name].shown
         error = free[np.isfinite(free[:, i]), i]
         z = whitened[np.isfinite(whitened[:, i]), i]
         channels[name] = {
             **_spread(z),
             "whitened_mean": float(np.mean(z)) if z.size else None,
-            "mean_band": _TWO_SIDED / float(np.sqrt(z.size)) if z.size else None,
+            "mean_band": TWO_SIDED / float(np.sqrt(z.size)) if z.size else None,
             "free_run_rms": factor * float(np.sqrt(np.mean(error**2))) if error.size else None,
             "unit": unit,
         }

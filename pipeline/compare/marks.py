@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.bins import bins, phases, runs, sides
 from kempf.pipeline.compare.correlations import given_to
 from kempf.pipeline.compare.evidence import ITSELF, Evidence
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import RunResiduals, Samples, samples_of
 
 #: share of the instants of a sample that contribute most to a correlation
@@ -59,7 +59,7 @@ def _contributing(residuals: Sequence[RunResiduals], finding: Evidence) -> Mask:
     """Return the instants that contribute most to a correlation, shape (N,)."""
     parts = []
     for run in residuals:
-        z = run.whitened[:, CHANNELS.index(finding.channel)]
+        z = run.whitened[:, MEASUREMENTS.index(finding.channel)]
         other = z if finding.which == ITSELF else given_to(run.filtered.run)[finding.which]
         lag = round(finding.lag_s / run.filtered.run.step_s)
         part = np.full(z.size, np.nan)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
-from kempf.pipeline.compare.comparison import ORDER, ComparedRun
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.predict.free_run import CHANNELS
-
-_UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
+from kempf.schemas.motion_channel import MOTION
+from kempf.schemas.units import SECOND_NS
 
 
 def instants_utc_ns(run: GridRun) -> NDArray[np.int64]:
@@ -21,8 +21,8 @@ def instants_utc_ns(run: GridRun) -> NDArray[np.int64]:
 
 def first_heading(run: GridRun) -> float:
     """Return the true heading, rad, that the measured one is counted from."""
-    known = np.isfinite(run.measured[:, CHANNELS.index("heading")])
-    from_first = run.measured[known, CHANNELS.index("heading")]
+    known = np.isfinite(run.measured[:, MEASUREMENTS.index("heading")])
+    from_first = run.measured[known, MEASUREMENTS.index("heading")]
     return float(np.median(run.heading_rad[known] - from_first)) if known.any() else 0.0
 
 
@@ -43,8 +43,8 @@ def run_series(run: ComparedRun) -> dict[str, Float | NDArray[np.int64]]:
         "rudder_angle_rad": record.rudder_rad,
         "speed_through_water_m_s": record.speed_m_s,
     }
-    for name in ORDER:
-        i, unit = CHANNELS.index(name), _UNITS[name]
+    for name, channel in MOTION.items():
+        i, unit = MEASUREMENTS.index(name), channel.suffix
         zero = first_heading(record) if name == "heading" else 0.0
         columns[f"{name}_{unit}"] = record.measured[:, i] + zero
         columns[f"{name}_predicted_{unit}"] = prediction.predicted[:, i] + zero

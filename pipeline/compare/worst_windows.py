@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
-from kempf.pipeline.compare.group import UNITS
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import RunResiduals
+from kempf.schemas.instants import iso_cut
+from kempf.schemas.motion_channel import MOTION
+from kempf.schemas.units import MILLISECOND_NS, SECOND_NS
 
 #: a window in instants, with a few to spare of what `kempf explain` needs, and how many windows are shown of each kind
 _WINDOW, _SHOWN = 24, 5
 _FEWEST = 4
-_MS_NS = 1_000_000
 
 
 def worst(residuals: Sequence[RunResiduals]) -> list[dict[str, Any]]:
@@ -31,7 +32,7 @@ def worst(residuals: Sequence[RunResiduals]) -> list[dict[str, Any]]:
         ``unit`` and how many times the channel's own it is. Windows of one channel do not overlap.
     """
     windows = []
-    for i, name in enumerate(CHANNELS):
+    for i, name in enumerate(MEASUREMENTS):
         windows += _one_step(residuals, i, name) + _free(residuals, i, name)
     shown = []
     for measure in ("one step", "free run"):
@@ -53,7 +54,7 @@ def _one_step(residuals: Sequence[RunResiduals], channel: int, name: str) -> lis
 
 
 def _free(residuals: Sequence[RunResiduals], channel: int, name: str) -> list[dict[str, Any]]:
-    unit, factor = UNITS[name]
+    unit, factor = MOTION[name].shown
     whole = np.concatenate([run.free.error[:, channel] for run in residuals])
     if not np.isfinite(whole).any():
         return []
@@ -102,5 +103,4 @@ def _window(residuals: RunResiduals, at: int) -> dict[str, Any]:
 
 def _iso(start_utc_ns: int, seconds: float, *, up: bool) -> str:
     instant_ns = start_utc_ns + round(seconds * SECOND_NS)
-    whole_ms = -(-instant_ns // _MS_NS) if up else instant_ns // _MS_NS
-    return f"{np.datetime_as_string(np.datetime64(whole_ms, 'ms'), unit='ms')}Z"
+    return iso_cut(-(-instant_ns // MILLISECOND_NS) * MILLISECOND_NS if up else instant_ns)

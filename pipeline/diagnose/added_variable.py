@@ -15,10 +15,11 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.nuisance import nuisance
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.sensitivity import N_HULL
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.diagnosis_evidence import AddedVariable
+from kempf.schemas.model_spec import N_HULL
 
-_BINS, _WIDTH_95 = 14, 1.96
+_BINS = 14
 
 
 def added_variables(diagnosis: Diagnosis) -> tuple[AddedVariable, ...]:
@@ -44,7 +45,7 @@ def _added_variable(fit: PooledFit, candidate: Candidate) -> AddedVariable:
         left=left,
         score=float(candidate.score),
         slope=float(expected @ left) / square if square > 0.0 else None,
-        slope_half_95=_WIDTH_95 / float(np.sqrt(candidate.score)) if candidate.score > 0.0 else None,
+        slope_half_95=NORMAL_95 / float(np.sqrt(candidate.score)) if candidate.score > 0.0 else None,
         bin_middle=middle,
         bin_mean=mean,
         bin_half_95=half,
@@ -66,5 +67,5 @@ def binned_means(x: Float, y: Float) -> tuple[Float, Float, Float]:
     parts = [part for part in np.array_split(order, _BINS) if part.size > 1]
     middle = np.array([np.mean(x[part]) for part in parts])
     mean = np.array([np.mean(y[part]) for part in parts])
-    half = np.array([_WIDTH_95 * np.std(y[part], ddof=1) / np.sqrt(part.size) for part in parts])
+    half = np.array([NORMAL_95 * np.std(y[part], ddof=1) / np.sqrt(part.size) for part in parts])
     return middle, mean, half

@@ -17,10 +17,10 @@ from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, pr
 from kempf.pipeline.diagnose.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
+from kempf.pipeline.diagnose.improves_prediction import worsens
 from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.legs import candidate_in_std
-from kempf.pipeline.diagnose.matters import worsens
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effect import Effect

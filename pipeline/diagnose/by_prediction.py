@@ -9,11 +9,11 @@ import numpy as np
 
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
+from kempf.pipeline.diagnose.improves_prediction import ALIKE, LEAST_FALL, STABLE, better_ahead
 from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.legs import ahead_in_std
-from kempf.pipeline.diagnose.matters import ALIKE, LEAST_FALL, STABLE, better_ahead
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.pipeline.shooting.paired import paired

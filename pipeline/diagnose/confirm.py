@@ -16,9 +16,10 @@ from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.sensitivity import N_HULL, Point
+from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import predictive
 from kempf.schemas.effect import Effect
+from kempf.schemas.model_spec import N_HULL
 
 #: what a candidate must save in the Bayesian information criterion (Kass & Raftery 1995, JASA 90: strong evidence)
 BIC_SAVING = 6.0

@@ -32,6 +32,7 @@ from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.shooting.ahead import Ahead, shooting_range
 from kempf.schemas.effect import Effect
+from kempf.schemas.enumeration import counted
 from kempf.schemas.model_spec import ModelSpec
 
 
@@ -102,7 +103,7 @@ def diagnose(
     if len(chosen) > 1:
         listener.begins("predicting one leg ahead")
         shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
-    listener.begins(f"screening {len(effects)} effect{'s' * (len(effects) != 1)}")
+    listener.begins(f"screening {counted(len(effects), 'effect')}")
     screened = screen(base, effects, workers, listener)
     models: Sequence[Ahead | None] = [None] * len(fits) if shooting is None else shooting.way(fits)
     rungs = tuple(step_of(fit, held, ahead, workers) for fit, ahead in zip(fits[:-1], models[:-1], strict=True))

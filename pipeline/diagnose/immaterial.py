@@ -10,9 +10,9 @@ from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.pipeline.shooting.paired import paired
+from kempf.schemas.model_spec import N_HULL
 
 #: part of the misfit one leg ahead by which it must fall with an effect that is certain, for that to matter
 LEAST_PART = 0.02

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.matters import ALIKE, LEAST_FALL, MOST, STABLE, stability_of, worsens
+from kempf.pipeline.diagnose.improves_prediction import ALIKE, LEAST_FALL, SHARE_BETTER, STABLE, stability_of, worsens
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, at_bounds
 from kempf.pipeline.shooting.normal_equations import NormalEquations
 from kempf.pipeline.shooting.paired import paired
@@ -128,7 +128,7 @@ def _holds(base: Ahead, ahead: Ahead) -> bool:
     owed = LEAST_FALL * (len(ahead.model.effects) - len(base.model.effects))
     falls = (paired(base.left_out, ahead.left_out), paired(base.held, ahead.held))
     return not worsens(base, ahead) and all(
-        fall.in_std > _FALLS and fall.falls_by > owed and fall.better >= MOST * fall.of for fall in falls
+        fall.in_std > _FALLS and fall.falls_by > owed and fall.better >= SHARE_BETTER * fall.of for fall in falls
     )
 
 

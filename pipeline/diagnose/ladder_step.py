@@ -11,7 +11,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
-from kempf.pipeline.diagnose.matters import comparisons
+from kempf.pipeline.diagnose.improves_prediction import comparisons
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.agreement import Agreement, agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -19,8 +19,7 @@ from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import FreeRun, free_run
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effect import Effect
-
-_HULL = ("a11", "a12", "a21", "a22", "b1", "b2")
+from kempf.schemas.model_spec import HULL_PARAMETERS
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +181,7 @@ def rung(number: int, step: Step, before: Ahead | None = None, agreement: Agreem
         "log_likelihood": step.fit.log_likelihood,
         "converged": step.fit.converged,
         "widened": widened,
-        "hull": dict(zip(_HULL, (float(x) for x in step.fit.hull), strict=True)),
+        "hull": dict(zip(HULL_PARAMETERS, (float(x) for x in step.fit.hull), strict=True)),
         "effects": {
             f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
             for (effect, parameter), v, s in zip(ship.model.parameters, ship.values, std, strict=True)
@@ -211,7 +210,7 @@ def _ahead(ahead: Ahead, before: Ahead | None) -> dict[str, Any]:
         "held_out_misfit": ahead.held.mean if held else None,
         "parameters": {
             name: {"value": float(value), "std": float(std)}
-            for name, value, std in zip((*_HULL, *ahead.model.names), ahead.fit.shared, std, strict=True)
+            for name, value, std in zip((*HULL_PARAMETERS, *ahead.model.names), ahead.fit.shared, std, strict=True)
         },
         "covariance": covariance.tolist(),
         "beside_the_rung_below": {

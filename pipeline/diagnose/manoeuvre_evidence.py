@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float, wrapped
 from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
 from kempf.pipeline.diagnose.judged_run import JudgedRun
 from kempf.pipeline.estimate.record.grid_run import GridRun
@@ -22,6 +22,7 @@ from kempf.schemas.diagnosis_evidence import (
     PredictedManoeuvre,
 )
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 #: horizons of the table beside the free run; one that a run is too short for is left out
 HORIZONS = ("1", "10s", "60s", "free")
@@ -114,7 +115,7 @@ class _BaseCourse:
         # without a measured heading, the one that the wind's direction is turned by
         heading = run.measured[:, 2] if known else run.heading_rad
         start = float(np.nanmean(run.heading_rad[first])) - np.radians(base_heading_deg)
-        approach = (start + np.pi) % (2.0 * np.pi) - np.pi
+        approach = float(wrapped(start))
         return cls(heading, float(np.nanmean(heading[first])) - approach)
 
     def deviation(self, heading: Float) -> Float:

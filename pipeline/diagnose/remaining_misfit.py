@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.pipeline.shooting.places import Place, Places, places
 from kempf.pipeline.shooting.repeats import Repeats, repeats
 from kempf.schemas.enumeration import at_the_beginning
 
-_CHANNELS = ("lateral_speed", "yaw_rate", "heading")
 _OF = {"rudder": "rudder", "yaw_rate": "yaw rate", "drift": "drift"}
 
 
@@ -65,7 +65,7 @@ def _noise(noise: Repeats, misfit: str) -> str:
 
 def _sits(by_place: Places, misfit: str) -> str:
     channel = int(np.nanargmax(by_place.channels))
-    name, share = _CHANNELS[channel].replace("_", " "), 100.0 * by_place.channels[channel]
+    name, share = MEASUREMENTS[channel].replace("_", " "), 100.0 * by_place.channels[channel]
     sentence = f"{at_the_beginning(misfit)} is largest in {name} ({share:.0f} % of it)"
     regime, manoeuvre = by_place.most("leg", *_OF), by_place.most("manoeuvre")
     named = [_held(place) for place in (regime, manoeuvre) if place is not None]
@@ -94,7 +94,7 @@ def as_json(remaining: RemainingMisfit) -> dict[str, Any]:
         "noise_share_std": noise.std,
         "pairs": noise.pairs,
         "manoeuvres": noise.manoeuvres,
-        "channels": dict(zip(_CHANNELS, remaining.places.channels, strict=True)),
+        "channels": dict(zip(MEASUREMENTS, remaining.places.channels, strict=True)),
         "places": [
             {"by": place.by, "name": place.name, "share": place.share, "of_windows": place.of_windows}
             for place in remaining.places.places

@@ -19,8 +19,8 @@ from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.formula_search import Term, search
 from kempf.pipeline.diagnose.nuisance import Nuisance, nuisance
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect, Parameter
+from kempf.schemas.model_spec import N_HULL
 
 _BOTH = {
     "1": "V**2/L",

@@ -31,8 +31,8 @@ from kempf.pipeline.diagnose.nuisance import Nuisance, nuisance
 from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect
+from kempf.schemas.model_spec import N_HULL
 
 
 @dataclass(frozen=True, eq=False)

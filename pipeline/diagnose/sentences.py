@@ -18,7 +18,7 @@ from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.pipeline.diagnose.verdict import share_explained, share_of_given, verdict
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
-from kempf.schemas.enumeration import at_the_beginning, listed
+from kempf.schemas.enumeration import at_the_beginning, counted, listed
 
 #: share of the misfit below which nothing of it is explained
 _LEAST_SHARE = 0.005
@@ -190,7 +190,7 @@ def _fall(first: Step, last: Step) -> str:
     if a is None or b is None:
         alone = f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
         return alone + _fitted_to_legs(first)
-    held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
+    held = counted(len(last.held), "held-out manoeuvre")
     sentence = (
         f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
         f"{fitted}, {disturbance}"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.nuisance import Nuisance, columns_of, nuisance, orthonormal, without_levels
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
-from kempf.pipeline.estimate.sensitivity import N_HULL
+from kempf.schemas.model_spec import N_HULL
 
 #: part of a variance below which rounding made it
 _NOTHING = 1e-9

@@ -5,10 +5,10 @@ fit believes them, and its hull is off by what they are off, in every manoeuvre 
 parameters of each log, with what is known of them as a normal distribution, and are found together with hull and
 effects by one step of Gauss and Newton: hundredths of a second move a hull so little that it is linear in them.
 
-The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.punctual`) is known no better, and is not
-found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and what it
-may do to the hull counts among the errors (Schmidt 1966, "Application of state-space methods to navigation problems",
-Advances in Control Systems 3: parameters that are considered, not estimated).
+The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.undelayed_speeds`) is known no better, and is
+not found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and
+what it may do to the hull counts among the errors (Schmidt 1966, "Application of state-space methods to navigation
+problems", Advances in Control Systems 3: parameters that are considered, not estimated).
 """
 
 from __future__ import annotations

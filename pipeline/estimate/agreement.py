@@ -16,7 +16,7 @@ from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
-from kempf.pipeline.estimate.sensitivity import N_HULL
+from kempf.schemas.model_spec import N_HULL
 
 #: with a smaller probability under one set of parameters the runs are said not to share it
 LEVEL = 0.01

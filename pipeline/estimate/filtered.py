@@ -13,14 +13,13 @@ from kempf.pipeline.estimate.likelihood import INITIAL_STD, Likelihood
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.model.batch import LANES, MOST, ONE
+from kempf.pipeline.model.chain import N_CHAIN
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.model_spec import ModelSpec
 
 #: so few sets of parameters go through one by one: a group of lanes costs less than twice as much
 _ALONE = 1
-#: states of a run that every fit of it begins from: v, r, psi, F and M, before the error of the speed and effects
-_CHAIN = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +100,7 @@ class RunFilter:
     ) -> list[Passed]:
         extra = self.model.extra
         std = np.array(INITIAL_STD) * self.present()
-        wide = np.concatenate([std[:_CHAIN], [self.run.speed_error_std_m_s], np.zeros(extra), std[_CHAIN:]])
+        wide = np.concatenate([std[:N_CHAIN], [self.run.speed_error_std_m_s], np.zeros(extra), std[N_CHAIN:]])
         used = np.where(np.array(self.levels_used())[:, None], levels, np.array([[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T)
         x0 = np.zeros((wide.size, hulls.shape[1]))
         return self._passes(hulls, used, values, x0, np.diag(wide**2), states=states, withheld=withheld)
@@ -129,8 +128,8 @@ class RunFilter:
         ndarray, shape (n, 3, k)
         """
         k = starts.shape[1]
-        between = np.zeros((N_BEFORE - _CHAIN + self.model.extra, k))
-        x0 = np.concatenate([starts[:_CHAIN], between, starts[_CHAIN:]])
+        between = np.zeros((N_BEFORE - N_CHAIN + self.model.extra, k))
+        x0 = np.concatenate([starts[:N_CHAIN], between, starts[N_CHAIN:]])
         held = np.ones(self.run.measured.shape[0], dtype=np.bool_)
         quiet = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
         hulls, levels, same = (np.repeat(column[:, None], k, axis=1) for column in (hull, quiet, values))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from kempf.pipeline.channels.robust_std import robust_std
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.record import MEASUREMENTS, Instants
 
@@ -52,7 +53,7 @@ def gate(record: Instants, innovation: Float, variance: Float, width: float, lar
         if rows.size == 0:
             continue
         white = innovation[rows, i] / np.sqrt(variance[rows, i])
-        spread = 1.4826 * float(np.median(np.abs(white)))
+        spread = robust_std(white)
         size = np.abs(white) / max(spread, 1.0)
         sound = np.minimum(np.roll(size, 1), np.roll(size, -1)) < _SOUND * width
         outside = rows[(size > width) & sound]

@@ -26,7 +26,7 @@ from kempf.pipeline.estimate.search.climb import Pass, Search, free
 from kempf.pipeline.estimate.uncertainty import from_information, sandwich
 from kempf.pipeline.model.chain import F, M
 from kempf.pipeline.model.disturbances import change_within
-from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
+from kempf.schemas.model_spec import HULL_PARAMETERS, N_HULL, NOISE_PARAMETERS, ModelSpec
 
 #: rate at which the ship answers times the rudder's period, above which its samples leave too much open
 _RUDDER_TOO_SLOW = 0.3
@@ -38,7 +38,6 @@ _FEW_TIMES = 5.0
 _VAGUE = 0.1
 #: time within which the changes of the disturbances are reported
 _CHANGE_S = 600.0
-_HULL = len(HULL_PARAMETERS)
 _NAMES = (*HULL_PARAMETERS, *NOISE_PARAMETERS)
 
 
@@ -99,7 +98,7 @@ def report(
     warnings = _warnings(record, objective, best, details["gross_errors"], heavy, bounds, ends)
     names = [_NAMES[i] for i in index]
     # as shares of the hull parameters; those of the logarithms are shares already
-    scale = np.concatenate([np.abs(theta[:_HULL]), np.ones(theta.size - _HULL)])
+    scale = np.concatenate([np.abs(theta[:N_HULL]), np.ones(theta.size - N_HULL)])
     off = dict(zip(names, (np.sqrt(np.diag(covariance)) / scale)[index], strict=True))
     warnings += _vague(uncertainty.weak, names, off)
     speed = record.mean_speed_m_s
@@ -166,7 +165,7 @@ def _warnings(
             f"the rudder is read every {record.rudder_period_s:.2g} s, too seldom for a ship that answers so fast: "
             "what it did in between is not known, and the standard errors do not say so; log the rudder faster"
         )
-    slowest, lasts = slowest_s(theta[:_HULL], record.mean_speed_m_s), float(record.time_s[-1])
+    slowest, lasts = slowest_s(theta[:N_HULL], record.mean_speed_m_s), float(record.time_s[-1])
     if lasts < _FEW_TIMES * slowest:
         warnings.append(
             f"the record lasts {lasts:.0f} s, {lasts / slowest:.1f} times the {slowest:.0f} s in which her slowest "

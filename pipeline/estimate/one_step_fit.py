@@ -8,6 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.record import MEASUREMENTS
+from kempf.schemas.confidence import NORMAL_95
 
 #: a prediction counts when its variance is below this many times the median one
 _SETTLED = 3.0
@@ -62,6 +63,6 @@ def one_step_fit(measured: Float, innovation: Float, variance: Float) -> dict[st
             "n": int(e.size),
             "settling": count - int(e.size),
             "lag1_autocorrelation": float(np.sum(white[1:] * white[:-1]) / np.sum(white**2)),
-            "inside_95_percent": float(np.mean(np.abs(white) < 1.96)),
+            "inside_95_percent": float(np.mean(np.abs(white) < NORMAL_95)),
         }
     return {"horizon": "one step", "sample": "in sample", "channels": channels}

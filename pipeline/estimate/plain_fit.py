@@ -28,9 +28,8 @@ from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.model_spec import N_HULL, ModelSpec
 
-_HULL = len(HULL_PARAMETERS)
 #: hulls of single runs that a common climb may begin from where their mean is no ship
 _ENTRIES = 4
 #: a measurement's level, by its logarithm, that is so far from its usual one is on another hill
@@ -55,7 +54,7 @@ class Alone:
     @property
     def hull(self) -> Float:
         """Its hull, shape (6,)."""
-        return self.search.theta[:_HULL]
+        return self.search.theta[:N_HULL]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ def off_in_std(single: Alone, fit: PooledFit) -> Float:
     """Return how far a run's own hull lies from a common one, in its own standard errors, shape (6,)."""
     information = single.search.information
     index = np.flatnonzero(np.diag(information) > 0.0)
-    std = np.sqrt(np.diag(from_information(information, index).covariance)[:_HULL])
+    std = np.sqrt(np.diag(from_information(information, index).covariance)[:N_HULL])
     off: Float = (single.hull - fit.hull) / std
     return off
 
@@ -123,7 +122,7 @@ def fit_plain(
             {"left_out": left_out},
         )
     filtered = [RunFilter(single.run, EffectModel(), spec) for single in alone]
-    own_levels = np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])
+    own_levels = np.array([single.search.theta[N_HULL:] + to_intensities(spec) for single in alone])
     levels = _first_levels(own_levels).ravel()
     mean = alone[0].hull if len(alone) == 1 else _weighted_mean(alone)
 
@@ -137,7 +136,7 @@ def fit_plain(
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
         layout, search = climbed_from(best)
-    separate = _separate(alone, filtered, own_levels, search.theta[:_HULL], workers)
+    separate = _separate(alone, filtered, own_levels, search.theta[:N_HULL], workers)
     if not (search.converged and _agreement(alone, separate, search).p_value >= LEVEL):
         # runs that seem to be of two ships may have been climbed on a lower hill
         beside, other = climbed_from(mariner_like(runs[0].ship.length_m).array())
@@ -173,7 +172,7 @@ def _separate(
 
 def _agreement(alone: Sequence[Alone], separate: float, search: Search[Arrow]) -> Agreement:
     """Return whether the runs share one hull, six degrees of freedom a run beyond the first."""
-    return Agreement(max(2.0 * (separate - search.log_likelihood), 0.0), _HULL * (len(alone) - 1))
+    return Agreement(max(2.0 * (separate - search.log_likelihood), 0.0), N_HULL * (len(alone) - 1))
 
 
 def fitted_alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
@@ -204,7 +203,7 @@ def _weighted_mean(alone: Sequence[Alone]) -> Float:
     """Mean of the separate hulls, each with the information it has beside its own levels."""
     weights = []
     for single in alone:
-        covariance = np.linalg.pinv(single.search.information, hermitian=True)[:_HULL, :_HULL]
+        covariance = np.linalg.pinv(single.search.information, hermitian=True)[:N_HULL, :N_HULL]
         weights.append(np.linalg.pinv(covariance, hermitian=True))
     total: Float = np.sum(weights, axis=0)
     moment: Float = np.sum([w @ single.hull for w, single in zip(weights, alone, strict=True)], axis=0)

@@ -17,11 +17,11 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.estimate.search.block_arrow import Arrow, inverse
 from kempf.pipeline.estimate.search.climb import Pass, Search, free, nobody
 from kempf.pipeline.estimate.search.variances import climb_in_variances
-from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
+from kempf.pipeline.estimate.sensitivity import N_LEVELS, Point
 from kempf.pipeline.model.batch import MOST
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
-from kempf.schemas.model_spec import NOISE_PARAMETERS
+from kempf.schemas.model_spec import N_HULL, NOISE_PARAMETERS
 
 #: converged when the log-likelihood that the shared parameters have still to gain falls below this: they lie within
 #: 0.05 standard errors of the maximum then

@@ -18,9 +18,10 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.level_bounds import next_to_nothing
 from kempf.schemas.instrument_noise import lasting
+from kempf.schemas.model_spec import N_HULL
 
 _ROOT_2 = float(np.sqrt(2.0))
-N_HULL, N_LEVELS = 6, 6
+N_LEVELS = 6
 #: steps of the differences: of hull parameters and effects in parts of a typical value, of a noise level's logarithm
 _HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
 #: part of a variance that a level's step adds to it

@@ -24,9 +24,8 @@ from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncert
 from kempf.pipeline.estimate.posterior import Posterior
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.variances import climb_in_variances
-from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.model.effect_model import EffectModel
-from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.model_spec import N_HULL, ModelSpec
 
 #: log-likelihood that the runs before may lose by the new top: farther from their own their parabola is no measure
 _FAR = 4.5

@@ -17,6 +17,7 @@ from kempf.pipeline.history.power import smallest_steps
 from kempf.pipeline.history.scan import Stretch, judge, stretch
 from kempf.pipeline.history.sets import ParameterHistory, occasions
 from kempf.pipeline.history.settings import ChangeSettings
+from kempf.schemas.enumeration import counted
 
 Kind = Literal["step", "drift"]
 
@@ -111,10 +112,7 @@ def find_changes(history: ParameterHistory, settings: ChangeSettings | None = No
 
 def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings: ChangeSettings) -> str:
     if len(merged) < settings.fewest:
-        sets, days = (
-            f"{n} {noun}{'' if n == 1 else 's'}"
-            for n, noun in ((len(history), "parameter set"), (len(merged), "occasion"))
-        )
+        sets, days = (counted(n, noun) for n, noun in ((len(history), "parameter set"), (len(merged), "occasion")))
         shared = f"; sets begun within {settings.occasion_s / 3600:g} h are one occasion: they share load and weather"
         return (
             f"{sets} with covariances on {days}, at least {settings.fewest} occasions are needed, "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.history.changes import Change, Changes
 from kempf.pipeline.history.pooled import Pooled
 from kempf.pipeline.history.sets import ParameterHistory
+from kempf.schemas.instants import iso_cut
 
 
 def report(history: ParameterHistory, pooled: Pooled | None, changes: Changes) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def report(history: ParameterHistory, pooled: Pooled | None, changes: Changes) -
     settings = changes.settings
     return {
         "sets": len(history),
-        "occasions": [instant(int(t)) for t in changes.occasion_utc_ns],
+        "occasions": [iso_cut(int(t), "s") for t in changes.occasion_utc_ns],
         "pooled": None if pooled is None else _pooled(history, pooled, settings.level),
         "verdict": changes.verdict,
         "why": changes.why,
@@ -36,18 +36,6 @@ def report(history: ParameterHistory, pooled: Pooled | None, changes: Changes) -
         "scatter_between_trials": _sizes(history, changes.scatter, changes.mean),
         "smallest_step_seen": {"power": settings.power, **_sizes(history, changes.smallest, changes.mean)},
     }
-
-
-def instant(time_utc_ns: int) -> str:
-    """Return UTC nanoseconds as ISO 8601 text to the second.
-
-    Examples
-    --------
-    >>> instant(1_746_258_421_147_000_000)
-    '2025-05-03T07:47:01Z'
-    """
-    text = (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=time_utc_ns // 1_000_000_000)).isoformat()
-    return text.removesuffix("+00:00") + "Z"
 
 
 def _pooled(history: ParameterHistory, pooled: Pooled, level: float) -> dict[str, Any]:
@@ -95,8 +83,8 @@ def _change(history: ParameterHistory, change: Change, level: float) -> dict[str
         }
     return {
         "kind": change.kind,
-        "between": [instant(t) for t in change.between_utc_ns],
-        "interval": [instant(t) for t in change.interval_utc_ns],
+        "between": [iso_cut(t, "s") for t in change.between_utc_ns],
+        "interval": [iso_cut(t, "s") for t in change.interval_utc_ns],
         "confidence": 1.0 - level,
         "p_value": change.p_value,
         "bic_ahead_of_other_form": change.rival,

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Nanoseconds
+from kempf.pipeline.channels.series import Float, Mask, Nanoseconds
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import NO_TIME, Nanoseconds
 from kempf.pipeline.ingest.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 #: Stamps of one source, by which it is judged whether several of its records come together.
 _LEAST = 20

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.text.times import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 #: A record this far ahead of both its neighbours has a damaged time, ns; without this rule it would make every record
 #: behind it look late.

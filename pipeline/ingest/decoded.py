@@ -43,7 +43,7 @@ CODE: dict[Reason, int] = {reason: i + 1 for i, reason in enumerate(REASONS)}
 
 
 @dataclass(frozen=True)
-class Misfit:
+class MalformedRows:
     """What of most records, or of many that follow each other, is not as the profile or the header says."""
 
     #: A sentence that quotes it, with what was expected.
@@ -161,7 +161,7 @@ class Decoded:
     #: What of the log could not be read; of the last part.
     lost: tuple[LostStretch, ...] = ()
     #: Why records are malformed, where they are many, the most frequent cause first; of the last part.
-    misfits: tuple[Misfit, ...] = ()
+    malformed: tuple[MalformedRows, ...] = ()
     #: What to do where no record carries a channel, for they are in an encoding that is not read; of the last part.
     next_step: str = ""
     #: Whether no record of the log comes behind these.

@@ -11,8 +11,8 @@ import polars as pl
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Reason, Values
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8
 from kempf.pipeline.ingest.layout import LONGEST_ROW, Layout, cells_of, fits, layout_of
+from kempf.pipeline.ingest.malformed_rows import OPEN, cells_amiss, quotations_amiss, times_amiss
 from kempf.pipeline.ingest.mapping import check_once
-from kempf.pipeline.ingest.misfit import OPEN, cells_amiss, quotations_amiss, times_amiss
 from kempf.pipeline.ingest.quoting import inside_quotes
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
@@ -92,7 +92,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     time[record[timed.good]] = timed.time_utc_ns[timed.good]
     unread = record[~timed.good & timed.stated]
     reason[unread] = CODE[Reason.MALFORMED]
-    misfits = (
+    malformed = (
         quotations_amiss(layout, count),
         cells_amiss(layout, count, named=source.columns is not None),
         times_amiss(layout.rows, {key: cells[key] for key in source.time.columns}, record, unread, source.time),
@@ -114,7 +114,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         reason,
         channels,
         timed.notes,
-        misfits=tuple(sorted(filter(None, misfits), key=lambda misfit: -misfit.records)),
+        malformed=tuple(sorted(filter(None, malformed), key=lambda cause: -cause.records)),
     )
 
 

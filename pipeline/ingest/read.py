@@ -1,4 +1,4 @@
-"""The one way in: a log's bytes and its vessel's profile, out come its readings, at once or part by part."""
+"""The one way in: a log's bytes and its vessel's profile, out come its readings, part by part."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import polars as pl
 
 from kempf.pipeline.ingest import sniff
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
-from kempf.pipeline.ingest.decoded import Decoded, Misfit
+from kempf.pipeline.ingest.decoded import Decoded, MalformedRows
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.readings import Readings, Tally, joined
+from kempf.pipeline.ingest.readings import Readings, Tally
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.pipeline.ingest.unset_clock import dated_parts
@@ -46,17 +46,6 @@ _CUT = 160
 _SEE_PROFILE = "See docs/profile.md for how to describe a log."
 
 
-def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Readings:
-    """Read one log and hold all of it; arguments and errors as in `read_parts`.
-
-    Returns
-    -------
-    Readings
-        In canonical channels, SI and UTC, with everything that was refused and why.
-    """
-    return joined(list(read_parts(name, log, profile)))
-
-
 def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Iterator[Readings]:
     """Read one log, some ten thousand messages at a time where the format allows it (MCAP), else in one part.
 
@@ -72,7 +61,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
     ------
     Readings
         In the order of the log, but that of each source some records may come with the part behind their own; notes and
-        what is lost with the last part. See `kempf.pipeline.ingest.readings.joined`.
+        what is lost with the last part.
 
     Raises
     ------
@@ -134,7 +123,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             continue
         if summary.tally.records_kept == 0:
             raise _nothing(name, checked, summary, decoded)
-        own = (*summary.notes(decoded.misfits), *notes, *dated.notes, *checked.notes, *clocks.notes())
+        own = (*summary.notes(decoded.malformed), *notes, *dated.notes, *checked.notes, *clocks.notes())
         yield replace(clocks.set_right(checked), notes=own)
 
 
@@ -166,14 +155,14 @@ class _Summary:
             times = [*(self.unset or ()), *unset]
             self.unset = min(times), max(times)
 
-    def notes(self, misfits: tuple[Misfit, ...]) -> list[str]:
+    def notes(self, malformed: tuple[MalformedRows, ...]) -> list[str]:
         """Return what a log is to be doubted for of which much was refused, other than for what it is no log of."""
-        doubts = [f"{misfit.found} {misfit.next_step}" for misfit in misfits]
+        doubts = [f"{cause.found} {cause.next_step}" for cause in malformed]
         doubts += self._mostly_refused()
         refused = {reason: n for reason, n in self._records.items() if reason not in _ORDINARY}
         most = max(sorted(refused), key=lambda reason: refused[reason], default="")
         share = refused[most] / self.tally.records_read if most else 0.0
-        if share <= _MANY or (most == "malformed" and misfits):
+        if share <= _MANY or (most == "malformed" and malformed):
             return doubts
         finer = _FINER_TIMES.get(self._format, "") if most == "same_instant" else ""
         much = "most" if share > 0.5 else f"{100.0 * share:.0f} %"
@@ -253,7 +242,7 @@ def _whole(name: str, log: LogFile) -> bytes:
 
 def _nothing(name: str, last: Readings, summary: _Summary, decoded: Decoded) -> DataRejected:
     """Return the error of a log that holds nothing; ``last`` and ``decoded`` are its last part, checked and before."""
-    misfits = decoded.misfits
+    malformed = decoded.malformed
     counts = summary.tally.by_reason
     listed = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda c: (-c[1], c[0])))
     years = ""
@@ -263,8 +252,8 @@ def _nothing(name: str, last: Readings, summary: _Summary, decoded: Decoded) -> 
     step = {
         "clock_unset": "The logger's clock was not set, or the unit of the time column is another: correct the unit in "
         "the profile or the times in a copy of the log, or ingest another log.",
-        "malformed": misfits[0].next_step
-        if misfits
+        "malformed": malformed[0].next_step
+        if malformed
         else "See whether the profile says how time and columns are written. " + _SEE_PROFILE,
         "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
@@ -276,7 +265,7 @@ def _nothing(name: str, last: Readings, summary: _Summary, decoded: Decoded) -> 
         "no_valid_reading",
         f"{name} holds no valid reading: {summary.tally.records_read} records, "
         f"of them {listed or 'none usable'}.{years}{_sample(last, most)}"
-        f"{''.join(f' {note}' for note in (*(misfit.found for misfit in misfits), *last.notes)[:_NOTES])}",
+        f"{''.join(f' {note}' for note in (*(cause.found for cause in malformed), *last.notes)[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
         {
             "name": name,

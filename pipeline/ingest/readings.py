@@ -8,8 +8,8 @@ Both ledgers close: read = kept + rejected.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import polars as pl
@@ -132,18 +132,3 @@ class Readings:
     def rejections(self) -> Iterator[pl.DataFrame]:
         """Yield what was refused."""
         yield self.rejected
-
-
-def joined(parts: Sequence[Readings]) -> Readings:
-    """Return the parts of a log as one; notes and what is lost are those of the last."""
-    if len(parts) == 1:
-        return parts[0]
-    return replace(
-        parts[-1],
-        # a part may hold back records for the next one
-        frame=pl.concat([part.frame for part in parts]).sort("record", maintain_order=True),
-        rejected=pl.concat([part.rejected for part in parts]).sort(
-            "record", "channel", nulls_last=False, maintain_order=True
-        ),
-        tally=sum((part.tally for part in parts), Tally()),
-    )

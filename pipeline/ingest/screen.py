@@ -17,9 +17,10 @@ from kempf.pipeline.ingest.clock import Clock
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Reason, Values
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import DAY_NS, days_since_1970
+from kempf.pipeline.ingest.text.times import days_since_1970
 from kempf.pipeline.ingest.turns import Turns
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import DAY_NS
 
 Code = NDArray[np.int8]
 Flag = NDArray[np.bool_]

@@ -14,8 +14,8 @@ import numpy as np
 
 from kempf.pipeline.ingest.decoded import NO_TIME, Decoded, Flag, Nanoseconds
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
-from kempf.pipeline.ingest.text.times import DAY_NS
 from kempf.schemas.profile import TimeColumn, start_ns
+from kempf.schemas.units import DAY_NS
 
 #: What is taken for a count from 1970-01-01: a year, and a day before for times that run up to zero.
 _FROM_NS, _TO_NS = -DAY_NS, 366 * DAY_NS

@@ -8,6 +8,7 @@ from math import degrees, isfinite, nan
 
 import numpy as np
 
+from kempf.pipeline.channels.running_mean import running_mean
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.sailed import Reach
@@ -98,9 +99,7 @@ def _smooth(column: Float, width: int) -> Float | None:
     if known.mean() < 0.3:
         return None
     at = np.arange(column.size)
-    laid = np.pad(np.interp(at, at[known], column[known]), (width // 2, width - 1 - width // 2), mode="edge")
-    smooth: Float = np.convolve(laid, np.ones(width) / width, mode="valid")
-    return smooth
+    return running_mean(np.interp(at, at[known], column[known]), width)
 
 
 def beyond(predicted: Reach, logs: Reach) -> tuple[Beyond, ...]:

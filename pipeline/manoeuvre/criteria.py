@@ -11,7 +11,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.covered import Beyond
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.segment.imo import overshoot_limits
 from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
@@ -89,7 +89,7 @@ def _criteria(
     def lengths(factor: float) -> float | None:
         return None if vessel.length_m is None else factor * vessel.length_m
 
-    if isinstance(manoeuvre, TurningCircle):
+    if isinstance(manoeuvre, PredictedCircle):
         note = "" if manoeuvre.rudder_rad >= radians(34.9) else "the standard asks for 35 deg of rudder, or the most"
         return [
             ("advance", "advance_m", lengths(ADVANCE), "m", note),

@@ -15,6 +15,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.distributions import binomial_up_to
+from kempf.schemas.confidence import NORMAL_95
 
 #: to which an overshoot is measured, deg
 READ_DEG = 0.1
@@ -22,8 +23,8 @@ READ_DEG = 0.1
 FEWEST = 4
 #: share of the parameters' size by which they scatter where its effect on the overshoots is looked at; the largest one
 REFERENCE, MOST = 0.03, 0.25
-#: half the width of a 95 % interval in standard errors; median of the square of a standard normal number
-_HALF, _MEDIAN = 1.96, 0.4549
+#: median of the square of a standard normal number
+_MEDIAN = 0.4549
 #: so improbable is no chance
 _CHANCE = 0.01
 _HALVINGS = 40
@@ -93,7 +94,7 @@ def missed(overshoots: Float) -> bool:
     if len(overshoots) < FEWEST:
         return False
     off, half = overshoots[:, 0] - overshoots[:, 1], 0.5 * (overshoots[:, 3] - overshoots[:, 2])
-    inside = int(np.sum(np.abs(off) <= np.hypot(half, _HALF * READ_DEG)))
+    inside = int(np.sum(np.abs(off) <= np.hypot(half, NORMAL_95 * READ_DEG)))
     return binomial_up_to(inside, len(off), 0.95) < _CHANCE
 
 
@@ -109,7 +110,7 @@ def scatter(overshoots: Float, scattered: Float) -> float:
     """
     if len(overshoots) < FEWEST or _misfit(overshoots, np.zeros(len(overshoots))) <= 1.0:
         return 0.0
-    variance = ((scattered[:, 3] - scattered[:, 2]) / (2.0 * _HALF * REFERENCE)) ** 2
+    variance = ((scattered[:, 3] - scattered[:, 2]) / (2.0 * NORMAL_95 * REFERENCE)) ** 2
     low, high = 0.0, MOST
     if _misfit(overshoots, high**2 * variance) > 1.0:
         return MOST
@@ -122,6 +123,6 @@ def scatter(overshoots: Float, scattered: Float) -> float:
 def _misfit(overshoots: Float, more: Float) -> float:
     """Return the square of what is missed, in that of the errors with some variance more, 1 where they fit."""
     off = overshoots[:, 0] - overshoots[:, 1]
-    variance = ((overshoots[:, 3] - overshoots[:, 2]) / (2.0 * _HALF)) ** 2 + READ_DEG**2 + more
+    variance = ((overshoots[:, 3] - overshoots[:, 2]) / (2.0 * NORMAL_95)) ** 2 + READ_DEG**2 + more
     # the median: one that was broken off or gusted upon is no misfit of the model
     return float(np.median(off**2 / variance) / _MEDIAN)

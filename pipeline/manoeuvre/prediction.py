@@ -23,7 +23,7 @@ _MOSTLY = 0.5
 
 
 @dataclass(frozen=True)
-class Figure:
+class PredictedFigure:
     """A number with its 95 % interval; all None where too few ships have it."""
 
     value: float | None
@@ -51,7 +51,7 @@ class OfModel:
         return self.sailed is not None and len(self.drawn) >= ENOUGH * (len(self.drawn) + self.no_ships)
 
     @property
-    def figures(self) -> dict[str, Figure]:
+    def figures(self) -> dict[str, PredictedFigure]:
         """By name, from this model alone."""
         return figures_of(self.sailed, [self])
 
@@ -61,7 +61,7 @@ class Prediction:
     """A predicted manoeuvre."""
 
     manoeuvre: Manoeuvre
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, PredictedFigure]
     #: The model that was asked for first.
     models: tuple[OfModel, ...]
     extrapolated: tuple[Beyond, ...]
@@ -136,7 +136,7 @@ def predict(
     )
 
 
-def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Figure]:
+def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, PredictedFigure]:
     """Return the figures of a ship, each with the interval from the lowest to the highest that one of the models has.
 
     So it holds 95 % whichever of them is the ship. Percentiles of all their draws together would not: beside a model
@@ -151,10 +151,10 @@ def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Fi
         many = [kept for kept, drawn in zip(there, of_each, strict=True) if kept.size >= ENOUGH * drawn.size]
         value = sailed.figures[name] if sailed is not None else np.nan
         if not many or sum(kept.size for kept in there) < ENOUGH * values.size or not np.isfinite(value):
-            figures[name] = Figure(None, None, None)
+            figures[name] = PredictedFigure(None, None, None)
         else:
             ends = np.array([np.percentile(kept, [_TAIL, 100.0 - _TAIL]) for kept in many])
-            figures[name] = Figure(float(value), float(ends[:, 0].min()), float(ends[:, 1].max()))
+            figures[name] = PredictedFigure(float(value), float(ends[:, 0].min()), float(ends[:, 1].max()))
     return figures
 
 

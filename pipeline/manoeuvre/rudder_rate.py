@@ -9,6 +9,7 @@ from math import degrees, radians
 
 import numpy as np
 
+from kempf.pipeline.channels.robust_std import robust_std
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.record import Record
 
@@ -53,7 +54,7 @@ def rudder_rate(records: Sequence[Record]) -> RudderRate:
                 floor = max(floor, rate)
     if rates:
         middle = float(np.median(rates))
-        spread = 1.4826 * float(np.median(np.abs(np.array(rates) - middle))) / np.sqrt(len(rates))
+        spread = robust_std(np.array(rates) - middle) / np.sqrt(len(rates))
         return RudderRate(middle, max(spread, _LEAST * middle), len(rates), "")
     taken = max(SOLAS_RAD_S, floor)
     why = "as SOLAS asks for" if taken == SOLAS_RAD_S else "the least that the readings allow"

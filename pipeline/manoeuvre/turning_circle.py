@@ -29,8 +29,8 @@ FIGURES = ("advance_m", "transfer_m", "tactical_diameter_m", *_STEADY, "time_to_
 
 
 @dataclass(frozen=True)
-class TurningCircle:
-    """One to a side."""
+class PredictedCircle:
+    """A turning circle to one side, to be predicted."""
 
     #: Magnitude.
     rudder_rad: float

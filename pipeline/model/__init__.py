@@ -1,1 +1,1 @@
-"""The ship of eqs. (16)-(17), her disturbances and the filter of eqs. (3)-(5)."""
+"""The ship of eqs. (16)-(17) with her effects, and her disturbances."""

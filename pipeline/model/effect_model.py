@@ -19,7 +19,7 @@ from kempf.pipeline.model.terms.program import CONSTANT, VARIABLE
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.errors import UsageError
 from kempf.schemas.instrument_noise import lasting
-from kempf.schemas.symbols import ACCELERATION_SYMBOLS, INSTRUMENT_STATES, OWN_STATES, SYMBOLS
+from kempf.schemas.symbols import ACCELERATION_SYMBOLS, INDEX, INSTRUMENT_STATES, OWN_STATES
 
 _PLACE = {
     "speed": dynamics.ON_SPEED,
@@ -32,7 +32,6 @@ _PLACE = {
 }
 #: part of a step of the grid that lasting noise lasts at least
 _SHORTEST = 0.25
-_INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 
 Table = tuple[NDArray[np.int64], NDArray[np.int64], Float, NDArray[np.int64]]
 
@@ -151,7 +150,7 @@ class EffectModel:
         programs, codes, constants = [], [], []
         start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
         for effect in self.effects:
-            variables = dict(_INDEX)
+            variables = dict(INDEX)
             for name in (*OWN_STATES, *INSTRUMENT_STATES):
                 del variables[name]
             for i, state in enumerate(effect.states):
@@ -230,7 +229,7 @@ def _moving(targets: Sequence[int], codes: Sequence[NDArray[np.int64]], width: i
         if target == dynamics.ON_RUDDER:
             of_rudder |= states | (of_speed if dynamics.SPEED in variables else set())
     through = {dynamics.SPEED: of_speed, dynamics.DELTA: of_rudder}
-    through |= {_INDEX[name]: set(range(width)) for name in ACCELERATION_SYMBOLS}
+    through |= {INDEX[name]: set(range(width)) for name in ACCELERATION_SYMBOLS}
     return [
         sorted(states.union(*(through[i] for i in variables & through.keys())))
         for states, variables in zip(own, asked, strict=True)

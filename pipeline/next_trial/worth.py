@@ -17,7 +17,8 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.distributions import normal_up_to
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.search.block_arrow import inverse
-from kempf.pipeline.estimate.sensitivity import N_HULL, Point, active, whitened, with_columns
+from kempf.pipeline.estimate.sensitivity import Point, active, whitened, with_columns
+from kempf.schemas.model_spec import N_HULL
 
 #: so often a manoeuvre may be repeated
 _MOST = 64

@@ -21,7 +21,6 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 _PRIOR = np.array([2.0, 0.1, 0.1, 0.05, 1e-3, 1.0, 1.0, 1e-3])
 _STEP = 1e-3 * _PRIOR
 _ROUNDS = 4
-CHANNELS = ("lateral_speed", "yaw_rate", "heading")
 
 
 @dataclass(frozen=True, eq=False)

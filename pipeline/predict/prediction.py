@@ -10,13 +10,13 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.one_step_fit import fit_percent
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.predict.free_run import CHANNELS, FreeRun, free_run_of
+from kempf.pipeline.predict.free_run import FreeRun, free_run_of
 from kempf.pipeline.predict.horizon import Horizon
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import DataRejected
 
-#: half width of a 95 % interval in standard deviations
-WIDTH_95 = 1.96
 #: a prediction counts when its variance is below this many times the median one: the first only carry the initial state
 _SETTLED = 3.0
 #: parts of a horizon; errors of its last part count, so that all predictions are between 3/4 and the whole of it ahead
@@ -33,7 +33,7 @@ class Predicted:
     #: Shape (n,).
     time_s: Float
     #: predicted, error: Shape (n, 3). What would be measured, and measured less predicted, columns
-    #: `pipeline.predict.free_run.CHANNELS`, m/s, rad/s, rad; NaN where nothing was measured or predicted.
+    #: `pipeline.estimate.record.record.MEASUREMENTS`, m/s, rad/s, rad; NaN where nothing was measured or predicted.
     predicted: Float
     error: Float
     #: Shape (n, 3). Of the error as the model has it; NaN in a free run, whose error no disturbance model describes.
@@ -58,16 +58,16 @@ class Predicted:
     def inside_95(self) -> dict[str, tuple[int, int]]:
         """Return how many measurements lie in their 95 % interval, and of how many; none in a free run."""
         counts = {}
-        for i, name in enumerate(CHANNELS):
+        for i, name in enumerate(MEASUREMENTS):
             good = np.isfinite(self.error[:, i]) & np.isfinite(self.std[:, i])
             if good.any():
-                within = np.abs(self.error[good, i]) < WIDTH_95 * self.std[good, i]
+                within = np.abs(self.error[good, i]) < NORMAL_95 * self.std[good, i]
                 counts[name] = (int(np.count_nonzero(within)), int(np.count_nonzero(good)))
         return counts
 
     def _channels(self) -> list[tuple[str, Float, Float]]:
         channels = []
-        for i, name in enumerate(CHANNELS):
+        for i, name in enumerate(MEASUREMENTS):
             good = np.isfinite(self.error[:, i])
             if np.count_nonzero(good) > 1:
                 channels.append((name, self.error[good, i] + self.predicted[good, i], self.error[good, i]))

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.prediction import settled
+from kempf.schemas.units import SECOND_NS
 
 
 @dataclass(frozen=True)

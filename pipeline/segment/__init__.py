@@ -1,1 +1,1 @@
-"""Zigzag manoeuvres found in whole logs: executes, overshoots, phases, and the IMO criteria."""
+"""Manoeuvres found in whole logs - zigzags, turning circles, pull-outs, spirals, random ones - and the IMO criteria."""

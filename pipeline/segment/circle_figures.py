@@ -11,7 +11,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift, current_by_log, is_current
-from kempf.pipeline.segment.figure import Figure
+from kempf.pipeline.segment.figure import MeasuredFigure
 from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD, TurningFigures, steady_span, turning_figures
 
@@ -32,7 +32,7 @@ class CircleFigures:
     """What a turning circle measures."""
 
     #: By the names of `TurningFigures`, and ``steady_diameter_of_track_m`` where there are positions.
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, MeasuredFigure]
     #: over_ground, less_drift: The same over ground and less the drift of the circle, whichever ``figures`` has; empty
     #: where the drift is not known.
     over_ground: Mapping[str, float | None]
@@ -117,7 +117,7 @@ def circle_figures(
     spread = _steady_spread(corrected, begin, course, corrected_figures)
     uncertain = 0.0 if drift is None or (by_passages and drift.seen and not agreed) else drift.std_m_s
     nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
-    figures: dict[str, Figure] = {}
+    figures: dict[str, MeasuredFigure] = {}
     values = asdict(corrected_figures)
     for name in _FROM_EXECUTE:
         figures[name] = _from_execute(name, values[name], nudged, track, execute_s)
@@ -127,9 +127,9 @@ def circle_figures(
         # over whole turns a current averages out of what is steady, over less it does not
         by_current = [] if by_passages or not uncertain else nudged[-2:]
         halves = [(getattr(high, name) - getattr(low, name)) / 2.0 for low, high in by_current]
-        figures[name] = Figure.of(values[name], float(np.hypot(spread[name], np.linalg.norm(halves))), missing)
+        figures[name] = MeasuredFigure.of(values[name], float(np.hypot(spread[name], np.linalg.norm(halves))), missing)
     if not np.isfinite(course_std_rad):
-        figures["speed_loss_percent"] = Figure.of(nan, nan, "the approach was not steady or is not recorded")
+        figures["speed_loss_percent"] = MeasuredFigure.of(nan, nan, "the approach was not steady or is not recorded")
     if source == "positions":
         figures["steady_diameter_of_track_m"] = _fitted_diameter(corrected, begin, course, short)
     return CircleFigures(
@@ -193,19 +193,19 @@ def _from_execute(
     nudged: list[tuple[TurningFigures, TurningFigures]],
     track: TurnTrack,
     execute_s: float | None,
-) -> Figure:
+) -> MeasuredFigure:
     if execute_s is None:
-        return Figure.of(nan, nan, "the execute is not recorded")
+        return MeasuredFigure.of(nan, nan, "the execute is not recorded")
     if name in _LENGTHS and track.source == "heading alone":
-        return Figure.of(nan, nan, "no positions and no speed are recorded")
+        return MeasuredFigure.of(nan, nan, "no positions and no speed are recorded")
     if name in _LENGTHS and track.source == "speed through the water and heading":
-        return Figure.of(value, nan, "the drift angle is not measured, and its error not known")
+        return MeasuredFigure.of(value, nan, "the drift angle is not measured, and its error not known")
     variance = sum(((getattr(high, name) - getattr(low, name)) / 2.0) ** 2 for low, high in nudged)
     if name in _LENGTHS and np.isfinite(track.distance_std_m):
         variance += track.distance_std_m**2
     elif name in _LENGTHS:
         variance += (_SPEED_SCALE * value) ** 2
-    return Figure.of(value, float(np.sqrt(variance)), "not reached")
+    return MeasuredFigure.of(value, float(np.sqrt(variance)), "not reached")
 
 
 def _steady_spread(track: TurnTrack, execute_s: float, course: float, figures: TurningFigures) -> dict[str, float]:
@@ -249,14 +249,14 @@ def _parts(track: TurnTrack, execute_s: float, course: float) -> Float | None:
     return np.array(rows, dtype=np.float64)
 
 
-def _fitted_diameter(track: TurnTrack, execute_s: float, course: float, short: str) -> Figure:
+def _fitted_diameter(track: TurnTrack, execute_s: float, course: float, short: str) -> MeasuredFigure:
     """Lay a circle through the positions of the steady turn; the standard error is their scatter about it."""
     after = track.time_s >= execute_s
     change = track.heading_rad[after] - course
     start, end = steady_span(track.time_s[after], np.sign(change[-1]) * change)
     inside = (track.time_s >= start) & (track.time_s <= end)
     if np.count_nonzero(inside) < 8:
-        return Figure.of(nan, nan, short)
+        return MeasuredFigure.of(nan, nan, short)
     north, east = track.north_m[inside], track.east_m[inside]
     north, east = north - np.mean(north), east - np.mean(east)
     # the circle's equation is linear in its centre and in radius squared less centre squared (Kasa 1976)
@@ -266,7 +266,7 @@ def _fitted_diameter(track: TurnTrack, execute_s: float, course: float, short: s
     away = np.hypot(north - solved[0], east - solved[1]) - radius
     # a diameter is off by twice what its radius is; an arc of less than a whole turn holds its centre less well
     arc = min(abs(float(np.ptp(track.heading_rad[inside]))) / (2.0 * pi), 1.0)
-    return Figure.of(2.0 * radius, 2.0 * float(np.std(away)) / arc**2, short)
+    return MeasuredFigure.of(2.0 * radius, 2.0 * float(np.std(away)) / arc**2, short)
 
 
 def _trend_percent(time_s: Float, speed: Float) -> float:

@@ -8,10 +8,10 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.constancy import speed_constancy
-from kempf.pipeline.segment.local_fit import value_and_rate
+from kempf.pipeline.segment.local_fit import peak, value_and_rate
 from kempf.pipeline.segment.measured import Signals, said_of_gap
 from kempf.pipeline.segment.nominal import measured_angles, nominal_angles
-from kempf.pipeline.segment.phases import leg_phases, turning_point
+from kempf.pipeline.segment.phases import leg_phases
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.switching import Chain, Switching
 from kempf.pipeline.segment.zigzag import (
@@ -20,10 +20,10 @@ from kempf.pipeline.segment.zigzag import (
     Phase,
     PhaseName,
     Quality,
-    Side,
     SpeedConstancy,
     Zigzag,
 )
+from kempf.schemas.side import Side
 
 #: Change of speed after the second execute from which it is called not constant, percent.
 _SPEED_TREND_PERCENT = 10.0
@@ -118,7 +118,10 @@ def _legs(signals: Signals, chain: Chain, switching: Switching, window_s: float)
         from_approach = opening and switching.start != "switching"
         after = chain.ramps[k + 1] if k < switching.last else None
         end = leg.end_s if after is None else after.start_s
-        turned = None if from_approach else turning_point(signals, start, end, -leg.side, window_s)
+        turned = None
+        if not from_approach:
+            # when and at which heading she turns back
+            turned = peak(signals.heading_s, signals.heading, start, end, side=-leg.side, half_window_s=window_s)
         if k == switching.last:
             end = _due(signals, switching, leg.side, turned[0] if turned else start, end)
         legs.append(_Leg(start, held, max(end, held), leg.side, execute, from_approach, turned))

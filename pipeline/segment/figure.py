@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import isfinite
 
-#: Standard errors from the middle to the ends of a 95 % interval.
-_WIDE = 1.96
+from kempf.schemas.confidence import NORMAL_95
 
 
 @dataclass(frozen=True)
-class Figure:
+class MeasuredFigure:
     """A figure in the unit that its name ends on."""
 
     #: None where the log does not hold it.
@@ -22,15 +21,15 @@ class Figure:
     why: str = ""
 
     @classmethod
-    def of(cls, value: float, std: float, why: str = "") -> Figure:
+    def of(cls, value: float, std: float, why: str = "") -> MeasuredFigure:
         """Return the figure of an estimate and its standard error; NaN for what is not known, and then why."""
         if not isfinite(value):
             return cls(None, None, None, why)
         if not isfinite(std):
             return cls(value, None, None, why)
-        return cls(value, value - _WIDE * std, value + _WIDE * std)
+        return cls(value, value - NORMAL_95 * std, value + NORMAL_95 * std)
 
     @property
     def std(self) -> float:
         """Standard error; NaN where it is not known."""
-        return float("nan") if self.low is None or self.high is None else (self.high - self.low) / (2.0 * _WIDE)
+        return float("nan") if self.low is None or self.high is None else (self.high - self.low) / (2.0 * NORMAL_95)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
-from kempf.pipeline.segment.turning_circle import TurningCircle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle
 
 #: Rudder at which the standard is judged, deg, and by how much less may have been held, as a share of it.
 _RUDDER_DEG, _LESS = 35.0, 0.06
@@ -30,12 +30,12 @@ class TurningCriterion:
     why: str
 
 
-def judge_circle(circle: TurningCircle, ship: Particulars) -> tuple[TurningCriterion, ...]:
+def judge_circle(circle: MeasuredCircle, ship: Particulars) -> tuple[TurningCriterion, ...]:
     """Judge a turning circle by the criteria.
 
     Parameters
     ----------
-    circle : TurningCircle
+    circle : MeasuredCircle
         The manoeuvre.
     ship : Particulars
         Of her profile.
@@ -59,7 +59,7 @@ def judge_circle(circle: TurningCircle, ship: Particulars) -> tuple[TurningCrite
     return tuple(judged)
 
 
-def _obstacle(circle: TurningCircle, ship: Particulars) -> str:
+def _obstacle(circle: MeasuredCircle, ship: Particulars) -> str:
     """Return why the trial is none in the sense of the standard, or an empty text."""
     speed = circle.measured.approach_speed_m_s
     reasons = {

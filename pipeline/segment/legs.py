@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.channels.robust_std import robust_std
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.segment.settings import SegmentSettings
 
@@ -66,7 +67,7 @@ def noise_level(values: Float) -> float:
     steps = np.abs(np.diff(values))
     moved = steps[steps > 1e-9]
     resolution = float(np.min(moved)) if moved.size else 0.0
-    return max(float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0)), resolution / 2)
+    return max(float(robust_std(np.diff(values, 2)) / np.sqrt(6.0)), resolution / 2)
 
 
 def _held_legs(time_s: Float, rudder: Float, amplitude: float, offset: float, band: float) -> list[Leg]:

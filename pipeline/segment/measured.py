@@ -7,12 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.segment.legs import Leg, noise_level
 from kempf.pipeline.segment.local_fit import value_and_rate
 from kempf.pipeline.segment.ramps import Ramp, approach_before, measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.switching import Chain
+from kempf.schemas.units import SECOND_NS
 
 #: Half width of the local cubic, as a share of the median leg from execute to execute.
 _WINDOW_SHARE = 0.08

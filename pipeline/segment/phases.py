@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.segment.local_fit import peak, value_and_rate
+from kempf.pipeline.segment.local_fit import value_and_rate
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.zigzag import PhaseName
 
@@ -13,30 +13,6 @@ _POINTS = 41
 
 #: Share of the leg's largest yaw rate from which the yaw counts as steady.
 _STEADY = 0.9
-
-
-def turning_point(
-    signals: Signals, start_s: float, end_s: float, side: int, window_s: float
-) -> tuple[float, float] | None:
-    """Return when and at which heading the ship turns back between two instants.
-
-    Parameters
-    ----------
-    signals : Signals
-        Heading and rudder.
-    start_s, end_s : float
-        Interval, s.
-    side : int
-        Where the ship swings, +1 starboard.
-    window_s : float
-        Half width of the local cubic, s.
-
-    Returns
-    -------
-    tuple of float or None
-        Instant, s, and heading, rad; None where it has not turned back by the end.
-    """
-    return peak(signals.heading_s, signals.heading, start_s, end_s, side=side, half_window_s=window_s)
 
 
 def leg_phases(

@@ -13,14 +13,14 @@ from typing import Literal
 
 import numpy as np
 
-from kempf.pipeline.segment.figure import Figure
+from kempf.pipeline.segment.figure import MeasuredFigure
 from kempf.pipeline.segment.held_rudder import HeldRudder
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.nominal import RUDDER_TOLERANCE, nominal_angle
 from kempf.pipeline.segment.ramps import measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.yaw_rate import MeanYawRate, mean_yaw_rate, settling_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: What a pair of pull-outs says about the ship on a straight course.
 Verdict = Literal["unstable", "no instability seen", "not judged"]
@@ -72,7 +72,7 @@ class PullOut:
     start_utc_ns: int
     end_utc_ns: int
     #: ``initial_yaw_rate_deg_s``, ``residual_yaw_rate_deg_s``: starboard positive.
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, MeasuredFigure]
     #: Of the pull-out to the other side that belongs to it; None where there is none.
     partner_start_utc_ns: int | None
     #: One of {"unstable", "no instability seen", "not judged"}. What both say of the ship.
@@ -143,8 +143,10 @@ def pull_out(signals: Signals, turn: HeldRudder, after: HeldRudder, settings: Se
         start_utc_ns=signals.utc_ns(start_s),
         end_utc_ns=signals.utc_ns(end_s),
         figures={
-            "initial_yaw_rate_deg_s": Figure.of(float(np.rad2deg(initial.value)), float(np.rad2deg(initial.std))),
-            "residual_yaw_rate_deg_s": Figure.of(float(left) if settled else nan, float(left_std), why),
+            "initial_yaw_rate_deg_s": MeasuredFigure.of(
+                float(np.rad2deg(initial.value)), float(np.rad2deg(initial.std))
+            ),
+            "residual_yaw_rate_deg_s": MeasuredFigure.of(float(left) if settled else nan, float(left_std), why),
         },
         partner_start_utc_ns=None,
         verdict="not judged",

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
 from kempf.pipeline.segment.measured import Signals, said_of_gap
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
+from kempf.schemas.units import SECOND_NS
 
 #: Smallest change of the rudder that is an order of such a manoeuvre, and smallest angle that it goes to or comes from,
 #: rad: keeping and regaining a course takes less.

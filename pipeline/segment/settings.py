@@ -48,3 +48,7 @@ class SegmentSettings:
     #: Switchings that must agree where the ship was still turning at K0: that heading is one check more, angles as they
     #: are ordered for a trial are another.
     switchings_from_turning: int = 3
+
+
+#: The thresholds by which logs are searched.
+STANDARD = SegmentSettings()

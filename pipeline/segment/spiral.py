@@ -14,12 +14,12 @@ from typing import Literal
 
 import numpy as np
 
-from kempf.pipeline.segment.figure import Figure
+from kempf.pipeline.segment.figure import MeasuredFigure
 from kempf.pipeline.segment.held_rudder import HeldRudder, band
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.settings import SegmentSettings
 from kempf.pipeline.segment.yaw_rate import settling_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: Whether the way there and the way back differ.
 Loop = Literal["seen", "none seen", "not judged"]
@@ -59,7 +59,7 @@ class SpiralPoint:
     #: Held rudder, starboard positive, deg.
     rudder_deg: float
     #: Rate to which the hold comes, starboard positive, deg/s: that of its last third, and what was still missing then.
-    yaw_rate_deg_s: Figure
+    yaw_rate_deg_s: MeasuredFigure
     #: Whether it was steady there.
     steady: bool
     #: start_utc_ns, end_utc_ns: From when to when the rudder was held.
@@ -87,7 +87,7 @@ class Spiral:
     #: One of {"seen", "none seen", "not judged"}.
     loop: Loop
     #: ``loop_width_deg``, ``loop_height_deg_s``; the interval of the width is what the steps leave open.
-    figures: Mapping[str, Figure]
+    figures: Mapping[str, MeasuredFigure]
     #: What a person should know, one sentence each.
     reasons: tuple[str, ...]
 
@@ -184,7 +184,7 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
     points = tuple(
         SpiralPoint(
             rudder_deg=float(np.rad2deg(hold.rudder)),
-            yaw_rate_deg_s=Figure.of(degrees(rate.comes_to), degrees(rate.comes_to_std)),
+            yaw_rate_deg_s=MeasuredFigure.of(degrees(rate.comes_to), degrees(rate.comes_to_std)),
             steady=at_rest,
             start_utc_ns=signals.utc_ns(hold.start_s),
             end_utc_ns=signals.utc_ns(hold.end_s),
@@ -212,14 +212,14 @@ def _described(signals: Signals, chain: Sequence[HeldRudder], ways: list[tuple[i
 
 def _loop(
     ways: list[tuple[SpiralPoint, ...]], same_deg: float, largest_deg_s: float
-) -> tuple[Loop, dict[str, Figure], list[str]]:
+) -> tuple[Loop, dict[str, MeasuredFigure], list[str]]:
     """Compare the first way with the second at the angles that both hold; return what is to be said of it, too."""
     if len(ways) < 2:
         return "not judged", _no_loop("the rudder went one way only"), [_ONE_WAY]
     falling, rising = ways[:2] if ways[0][0].rudder_deg > ways[0][-1].rudder_deg else (ways[1], ways[0])
     inner = _INNER * max(abs(point.rudder_deg) for way in ways[:2] for point in way)
     heights = [
-        Figure.of((a.yaw_rate_deg_s.value or 0.0) - (b.yaw_rate_deg_s.value or 0.0), _both(a, b))
+        MeasuredFigure.of((a.yaw_rate_deg_s.value or 0.0) - (b.yaw_rate_deg_s.value or 0.0), _both(a, b))
         for a in falling
         for b in rising
         if abs(a.rudder_deg - b.rudder_deg) <= same_deg and abs(a.rudder_deg) <= inner
@@ -233,12 +233,12 @@ def _loop(
         return "none seen", _no_loop("the way there and the way back agree"), []
     height = max(seen, key=lambda h: h.value or 0.0)
     (down, down_low, down_high), (up, up_low, up_high) = _crossing(falling), _crossing(rising)
-    width = Figure(up - down, max(up_low - down_high, 0.0), up_high - down_low)
+    width = MeasuredFigure(up - down, max(up_low - down_high, 0.0), up_high - down_low)
     return "seen", {"loop_width_deg": width, "loop_height_deg_s": height}, []
 
 
-def _no_loop(why: str) -> dict[str, Figure]:
-    return {name: Figure.of(nan, nan, why) for name in ("loop_width_deg", "loop_height_deg_s")}
+def _no_loop(why: str) -> dict[str, MeasuredFigure]:
+    return {name: MeasuredFigure.of(nan, nan, why) for name in ("loop_width_deg", "loop_height_deg_s")}
 
 
 def _both(one: SpiralPoint, other: SpiralPoint) -> float:

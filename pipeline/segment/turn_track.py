@@ -13,7 +13,8 @@ import numpy as np
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.positions import EARTH_M, plane
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series, wrapped
+from kempf.schemas.units import SECOND_NS
 
 Source = Literal["positions", "speed and course over ground", "speed through the water and heading", "heading alone"]
 
@@ -59,7 +60,7 @@ class TurnTrack:
             north_m=self.north_m - north_m_s * since,
             east_m=self.east_m - east_m_s * since,
             speed_m_s=np.hypot(north, east),
-            drift_rad=_wrapped(self.heading_rad - np.arctan2(east, north)),
+            drift_rad=wrapped(self.heading_rad - np.arctan2(east, north)),
         )
 
 
@@ -156,7 +157,7 @@ def _made(
     assert speed is not None
     drift, bridged = np.full(time_s.size, np.nan), 0.0
     if course is not None:
-        drift = _wrapped(heading - course)
+        drift = wrapped(heading - course)
         wrong = np.abs(drift) > _LARGEST_DRIFT_RAD
         bridged = float(np.mean(wrong))
         if 0.0 < bridged < 1.0:
@@ -178,7 +179,3 @@ def _slope(time_s: Float, values: Float, quarter_s: float) -> Float:
     at = np.arange(time_s.size)
     before, after = np.maximum(at - half, 0), np.minimum(at + half, time_s.size - 1)
     return np.asarray((values[after] - values[before]) / (time_s[after] - time_s[before]), dtype=np.float64)
-
-
-def _wrapped(angle: Float) -> Float:
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi, dtype=np.float64)

@@ -22,7 +22,7 @@ from kempf.pipeline.segment.switching import Start
 from kempf.pipeline.segment.turn_track import track_of
 from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD
 from kempf.pipeline.segment.yaw_rate import mean_yaw_rate
-from kempf.pipeline.segment.zigzag import Side
+from kempf.schemas.side import Side
 
 #: Heading change that makes a circle of a turn from a steady approach, rad; from any other one it has to be steady.
 _HALF_TURN = pi
@@ -67,7 +67,7 @@ class CircleQuality:
 
 
 @dataclass(frozen=True)
-class TurningCircle:
+class MeasuredCircle:
     """One turning circle."""
 
     #: One of {"starboard", "port"}.
@@ -94,7 +94,7 @@ class TurningCircle:
 
 def turning_circle(
     signals: Signals, instruments: Instruments, held: HeldRudder, settings: SegmentSettings
-) -> TurningCircle | None:
+) -> MeasuredCircle | None:
     """Describe the turning circle under a held rudder.
 
     Parameters
@@ -110,7 +110,7 @@ def turning_circle(
 
     Returns
     -------
-    TurningCircle or None
+    MeasuredCircle or None
         None where it is none: the rudder is too small or was not put over by one movement, the heading changed by less
         than 180 deg or away from the rudder's side, or by less than 350 deg from an approach that was not steady; or
         she went across her bow for long, as no ship under way does.
@@ -157,7 +157,7 @@ def turning_circle(
         course_std_rad=float(np.std(signals.heading[approach])) if from_approach else float("nan"),
     )
     rudder_deg = np.rad2deg(signals.rudder[held.first : held.last + 1])
-    return TurningCircle(
+    return MeasuredCircle(
         side="starboard" if side > 0 else "port",
         delta0_deg=nominal_angle(abs(float(np.rad2deg(held.rudder))), 0.0, RUDDER_TOLERANCE),
         delta0_measured_deg=abs(float(np.rad2deg(held.rudder))),

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from kempf.pipeline.segment.switching import Start
+from kempf.schemas.side import Side
 
 #: ``zigzag_broken_off``: fewer than two executes after the first, so that no second overshoot exists.
 Kind = Literal["zigzag", "zigzag_broken_off"]
-Side = Literal["starboard", "port"]
 
 #: Phases in the order in which a leg goes through them. ``execute``: the rudder moves. ``yaw_build_up``: first leg, the
 #: ship starts to turn. ``overshoot``: the rudder lies against the swing. ``counter_rudder``: the ship swings back.

@@ -22,10 +22,10 @@ from kempf.pipeline.shooting.paired import Paired, paired
 from kempf.pipeline.shooting.reduced import Scales
 from kempf.pipeline.shooting.scales import scaled
 from kempf.pipeline.shooting.shooting_fit import ShootingFit, alone
-from kempf.pipeline.shooting.shot_run import N_HULL, Moved, ShotRun
+from kempf.pipeline.shooting.shot_run import Moved, ShotRun
 from kempf.pipeline.shooting.windows import Windows, leg_s, windows_of
 from kempf.schemas.effect import Effect
-from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.model_spec import N_HULL, ModelSpec
 
 #: standard errors, and least part of the misfit, by which fits one step and one leg ahead disagree
 _DISAGREE, _LEAST = 3.0, 0.1

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.shooting.reduced import Reduced
-from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun
+from kempf.pipeline.shooting.shot_run import ShotRun
+from kempf.schemas.model_spec import N_HULL
 
 #: standard deviation of the weak prior of the hull's parameters, parts of those of an ordinary hull of her length
 _HULL_WIDE = 1.0

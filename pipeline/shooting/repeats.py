@@ -24,11 +24,11 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.ekf import ROWS
+from kempf.pipeline.estimate.record.grid_run import SHAFT_COLUMN
 from kempf.pipeline.shooting.reduced import Scales, whitened
 from kempf.pipeline.shooting.shooting_fit import ShootingFit, alone
 from kempf.pipeline.shooting.shot_run import ShotRun, Unknowns
 from kempf.pipeline.shooting.windows import Windows, windows_of
-from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: windows whose courses differ by at most this part of their size nearly repeat each other
 NEAR = 0.3
@@ -44,7 +44,6 @@ _LEAST = 0.25
 _STEPS = 2
 #: how many courses there are
 _COURSES = 8
-_SHAFT = 2 + list(CHANNEL_SYMBOLS).index("n")
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def _swept(
     rows, motion = dense.begins[:, None] + points, predicted.reshape(shape)[:, points]
     heading = run.heading_rad[rows]
     courses = [run.rudder_rad[rows], motion[..., 0], motion[..., 1], motion[..., 2] - motion[:, :1, 2]]
-    courses += [run.speed_m_s[rows], run.inputs[::ROWS, _SHAFT][rows], np.sin(heading), np.cos(heading)]
+    courses += [run.speed_m_s[rows], run.inputs[::ROWS, SHAFT_COLUMN][rows], np.sin(heading), np.cos(heading)]
     half = max(1, length // 2 // max(1, length // _DENSE))
     return _Swept(half, left, np.stack(courses, axis=-1))
 

@@ -18,7 +18,8 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.shooting.normal_equations import NormalEquations, normal_equations
 from kempf.pipeline.shooting.reduced import Reduced, Scales, reduce
-from kempf.pipeline.shooting.shot_run import N_HULL, Moved, ShotRun, Unknowns
+from kempf.pipeline.shooting.shot_run import Moved, ShotRun, Unknowns
+from kempf.schemas.model_spec import N_HULL
 
 _ITERATIONS, _SETTLED = 20, 1e-4
 #: windows over which what is misfitted hangs together

@@ -13,12 +13,11 @@ from kempf.pipeline.model.batch import LANES, MOST
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.shooting.effect_states import integrate_effect_states
 from kempf.pipeline.shooting.kernel import shoot
-from kempf.pipeline.shooting.led import lead
 from kempf.pipeline.shooting.windows import Windows
-from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.model_spec import N_HULL, ModelSpec
 
-N_HULL = 6
 #: what may be off nothing for a whole manoeuvre, parts of the ship's own scales: F, M, c_1, c_2, b
 _OWN = 5
 #: F in U^2/L, M in U^2/L^2, current in U, bias of the rate gyro in U/L
@@ -113,7 +112,7 @@ class ShotRun:
         """Return the states of the effects at all instants of the run, shape (n, k, lanes)."""
         run = self.windows.run
         states = np.empty((run.measured.shape[0], self.model.extra, MOST))
-        lead(
+        integrate_effect_states(
             *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
             *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.current_row, constants),
             *(self.windows.course, np.ascontiguousarray(own), self.model.table, states, LANES),

@@ -7,14 +7,12 @@ import gzip
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.simulate.instruments import SECOND_NS
 from kempf.pipeline.simulate.logger_fields import LOGGER_FIELDS
 from kempf.pipeline.simulate.trial import Trial
 from kempf.schemas.errors import UsageError
+from kempf.schemas.units import MILLISECOND_NS, SECOND_NS
 
 Nanoseconds = NDArray[np.int64]
-
-_MILLISECOND_NS = 1_000_000
 
 
 def to_csv(trial: Trial, rate_hz: float = 10.0) -> bytes:
@@ -47,7 +45,7 @@ def to_csv(trial: Trial, rate_hz: float = 10.0) -> bytes:
             "Add instruments, or make the programme longer.",
         )
     period_ns = round(SECOND_NS / rate_hz)
-    first = -(-max(int(a[0]) for a in arrivals) // _MILLISECOND_NS) * _MILLISECOND_NS
+    first = -(-max(int(a[0]) for a in arrivals) // MILLISECOND_NS) * MILLISECOND_NS
     last = max(first, min(int(a[-1]) for a in arrivals))
     rows: Nanoseconds = np.arange(first, last + 1, period_ns, dtype=np.int64)
     columns = [_stamps(rows)]
@@ -61,5 +59,5 @@ def to_csv(trial: Trial, rate_hz: float = 10.0) -> bytes:
 
 
 def _stamps(utc_ns: Nanoseconds) -> list[str]:
-    milliseconds = (utc_ns // _MILLISECOND_NS).astype("datetime64[ms]")
+    milliseconds = (utc_ns // MILLISECOND_NS).astype("datetime64[ms]")
     return [f"{text}Z" for text in np.datetime_as_string(milliseconds, unit="ms")]

@@ -14,11 +14,10 @@ from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.sensors import SENSORS, Setting
 from kempf.pipeline.simulate.trajectory import Trajectory
 from kempf.schemas.errors import UsageError
+from kempf.schemas.units import SECOND_NS
 
 Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
-
-SECOND_NS = 1_000_000_000
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf, pi, radians
-from typing import ClassVar, Literal
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.plant import AUTOPILOT, FIXED, ORDERS, ZIGZAG
+from kempf.schemas.side import Side
 
 Float = NDArray[np.float64]
-Side = Literal["starboard", "port"]
 
 #: Time between two orders of the helmsman or the autopilot, s.
 TICK_S = 0.5
@@ -26,13 +26,12 @@ class Steering:
     kind: int
     settings: Float
     orders: Float
-    longest_s: float
 
 
-def _autopilot(heading_rad: float, hull: SimulatedHull, longest_s: float) -> Steering:
+def _autopilot(heading_rad: float, hull: SimulatedHull) -> Steering:
     # gains in the ship's own time L/V: well damped for every hull of the catalogue, a fraction of a degree in calm sea
     time = hull.length_m / hull.trial_speed_m_s
-    return Steering(AUTOPILOT, np.array([heading_rad, 1.0, 1.5 * time, 0.15 / time]), np.empty(0), longest_s)
+    return Steering(AUTOPILOT, np.array([heading_rad, 1.0, 1.5 * time, 0.15 / time]), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class SteadyCourse:
         turn = 0.0
         if self.heading_deg is not None:
             turn = (radians(self.heading_deg) - heading_rad + pi) % (2 * pi) - pi
-        return _autopilot(heading_rad + turn, hull, self.duration_s)
+        return _autopilot(heading_rad + turn, hull)
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class CourseChange:
 
     def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
-        return _autopilot(heading_rad + radians(self.change_deg), hull, self.duration_s)
+        return _autopilot(heading_rad + radians(self.change_deg), hull)
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,7 @@ class ZigzagTest:
         side = 1.0 if self.first_side == "starboard" else -1.0
         legs = inf if self.legs is None else float(self.legs)
         settings = [heading_rad, radians(self.heading_deg), radians(self.rudder_deg), side, legs]
-        return Steering(ZIGZAG, np.array(settings), np.empty(0), self.duration_s)
+        return Steering(ZIGZAG, np.array(settings), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -116,7 +115,7 @@ class TurningCircle:
     def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
         settings = np.array([radians(self.rudder_deg), radians(self.change_deg)])
-        return Steering(FIXED, settings, np.empty(0), self.duration_s)
+        return Steering(FIXED, settings, np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -137,20 +136,7 @@ class HeldRudder:
 
     def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
-        return Steering(FIXED, np.array([radians(self.rudder_deg), inf]), np.empty(0), self.duration_s)
-
-
-def direct_spiral(angles_deg: tuple[float, ...], hold_s: float) -> tuple[HeldRudder, ...]:
-    """Return the steps of a direct spiral: the angles from side to side, and back over the same ones.
-
-    Parameters
-    ----------
-    angles_deg : tuple of float
-        From one side to the other, starboard positive.
-    hold_s : float
-        How long each is held.
-    """
-    return tuple(HeldRudder(angle, hold_s) for angle in (*angles_deg, *angles_deg[-2::-1]))
+        return Steering(FIXED, np.array([radians(self.rudder_deg), inf]), np.empty(0))
 
 
 @dataclass(frozen=True)
@@ -182,7 +168,7 @@ class HandSteering:
         waves = np.sin(2.0 * pi * frequency * time[:, None] + phase)
         orders = radians(self.rudder_rms_deg) * np.sqrt(2.0 / n_waves) * waves.sum(axis=1)
         limited = np.clip(orders, -hull.rudder_limit_rad, hull.rudder_limit_rad)
-        return Steering(ORDERS, np.zeros(5), limited, self.duration_s)
+        return Steering(ORDERS, np.zeros(5), limited)
 
 
 Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | HeldRudder | HandSteering
@@ -199,9 +185,8 @@ class ManoeuvreRecord:
     end_s: float
     #: Heading at the beginning, not wrapped; K0 of a zigzag.
     base_heading_rad: float
-    #: Instants at which the rudder was ordered over; for a zigzag one a leg.
+    #: Instants at which the rudder was ordered over; for a zigzag one a leg, and all but the first where the heading
+    #: crossed K0 +- psi0.
     executes_s: tuple[float, ...] = ()
-    #: Instants at which the heading crossed K0 +- psi0.
-    crossings_s: tuple[float, ...] = ()
     #: Of a zigzag, greatest heading beyond psi0 after each crossing whose turn came to its end.
     overshoots_rad: tuple[float, ...] = ()

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from kempf.pipeline.simulate.instruments import InstrumentRecord
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.trial import Trial
-from kempf.schemas.units import factor_to_si
+from kempf.schemas.units import MILLISECOND_NS, factor_to_si
 
 Nanoseconds = NDArray[np.int64]
 
-_MILLISECOND_NS = 1_000_000
 _CENTISECOND_NS = 10_000_000
 
 
@@ -62,7 +61,7 @@ def to_nmea(trial: Trial, damaged_share: float = 0.002) -> bytes:
         return gzip.compress(b"", mtime=0)
     arrival = np.concatenate(arrivals)
     order = np.argsort(arrival, kind="stable")
-    stamps = np.datetime_as_string((arrival[order] // _MILLISECOND_NS).astype("datetime64[ms]"), unit="ms")
+    stamps = np.datetime_as_string((arrival[order] // MILLISECOND_NS).astype("datetime64[ms]"), unit="ms")
     lines = [f"{stamp}Z {sentences[k]}".encode("ascii") for stamp, k in zip(stamps, order, strict=True)]
     random = stream(trial.settings.seed, "damage")
     for k in np.flatnonzero(random.random(len(lines)) < damaged_share):

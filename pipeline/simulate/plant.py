@@ -218,7 +218,7 @@ def steer(
     constants : ndarray, shape (11,)
         See `kempf.pipeline.simulate.plant.hull_constants`.
     states, rudders, ordered, forcing : ndarray
-        The columns of `Tables`.
+        The columns of the tables in `kempf.pipeline.simulate.programme`.
     crossings : ndarray
         Receives the instants of the zigzag's crossings, s since row 0.
     """
@@ -277,7 +277,7 @@ def follow(rudder: Float, grid: tuple[float, int], first: int, constants: Float,
     constants : ndarray, shape (11,)
         See `kempf.pipeline.simulate.plant.hull_constants`.
     states, forcing : ndarray
-        The columns of `Tables`.
+        The columns of the tables in `kempf.pipeline.simulate.programme`.
     """
     cell_s, substeps = grid
     step_s = cell_s / substeps

@@ -131,7 +131,7 @@ def _record(step: Step, tables: _Tables, first: int, last: int, crossings: Float
     if step.legs is not None and len(instants) >= step.legs:
         executes, end = executes[: step.legs], instants[-1]
     beyond = _overshoots(step, tables, base, np.array([*instants, end]), last)
-    return ManoeuvreRecord(step, start, end, base, tuple(executes), tuple(instants), beyond)
+    return ManoeuvreRecord(step, start, end, base, tuple(executes), beyond)
 
 
 def _overshoots(step: ZigzagTest, tables: _Tables, base: float, instants: Float, last: int) -> tuple[float, ...]:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
 from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument, InstrumentRecord, measure
-from kempf.pipeline.simulate.manoeuvre import ManoeuvreRecord, Side, SteadyCourse, Step, ZigzagTest
+from kempf.pipeline.simulate.manoeuvre import ManoeuvreRecord, SteadyCourse, Step, ZigzagTest
 from kempf.pipeline.simulate.programme import GRID_S, sail
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.sensors import Setting
 from kempf.pipeline.simulate.trajectory import Trajectory
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 
 #: The disturbances of the paper's simulated trial: force 5e-3 m/s^2, here with a slow part, and a stream of 0.3 m/s.
 PAPER_ENVIRONMENT = Environment(

@@ -13,9 +13,8 @@ from collections.abc import Callable
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.schemas.confidence import NORMAL_95
 
-#: two-sided 95 % point of the normal distribution
-NORMAL_95 = 1.959963984540054
 _STEP = 1e-30
 
 

@@ -46,8 +46,6 @@ class Track:
     #: Shape (n, n_state). v, r, psi (from the course at the start), F, V_T as the law sees them, then the states of
     #: effects.
     estimate: Float
-    #: Shape (n,).
-    order_rad: Float
 
     @property
     def heading_error_rad(self) -> Float:
@@ -113,7 +111,7 @@ def keep_course(
     for instant, heading in changes:
         course[time >= instant] = heading
     n_state = len(law.plant.states)
-    truth, estimate, order = np.empty((steps, 8)), np.empty((steps, n_state)), np.empty(steps)
+    truth, estimate = np.empty((steps, 8)), np.empty((steps, n_state))
     x, turned, last_rudder = np.zeros(n_state), np.zeros(n_state), 0.0
     for k in range(steps):
         measured, rudder = ship.measure()
@@ -125,10 +123,10 @@ def keep_course(
             x = law.predict(x, 0.5 * (last_rudder + rudder))
         x = law.correct(x, measured)
         turned[2] = course[k] - course_rad
-        truth[k], estimate[k], order[k] = ship.truth(), x, law.order(x - turned)
+        truth[k], estimate[k] = ship.truth(), x
         last_rudder = rudder
-        ship.hold(float(order[k]), law.step_s)
-    return Track(time, course, truth, estimate, order)
+        ship.hold(float(law.order(x - turned)), law.step_s)
+    return Track(time, course, truth, estimate)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.averaging import readings_averaged
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 COUNT, STD = 1500, 0.05
 

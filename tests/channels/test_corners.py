@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.corners import with_corners
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.schemas.units import SECOND_NS
 
 NOISE = np.deg2rad(0.1)
 

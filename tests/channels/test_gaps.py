@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.gaps import named_gaps
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: 2025-05-03 06:00:00 UTC
 START_S = 1_746_252_000

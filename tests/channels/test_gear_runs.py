@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.gear_runs import with_straight_runs
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.standing import without_noise
+from kempf.schemas.units import SECOND_NS
 
 NOISE = np.deg2rad(0.1)
 RATE = np.deg2rad(2.5)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s, make_grid
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 START = 1_746_252_000_000_000_000
 

@@ -14,11 +14,12 @@ from hypothesis import strategies as st
 from kempf.pipeline.channels.holds import find_held
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.channels.lateral_speed import lateral_speed
-from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.schemas.units import SECOND_NS
+from tests.reading import read_log
 
 ROW_NS = 100_000_000
 

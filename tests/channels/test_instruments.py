@@ -11,9 +11,9 @@ import yaml
 
 from kempf.pipeline.channels import instruments
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import READING_SCHEMA
 from kempf.schemas.profile import parse
+from tests.reading import read_log
 
 ROOT = Path(__file__).parents[2]
 START = 1_746_252_000_000_000_000

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, check_current, lateral_speed, noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
+from kempf.schemas.units import SECOND_NS
 
 START = 1_746_252_000_000_000_000
 
@@ -98,7 +99,7 @@ def sailed(north: float, east: float, heading_deg: float) -> Trial:
 
 def measured(trial: Trial) -> dict[str, Series]:
     """Channels over whole cycles of the zigzag, at their instants of measurement."""
-    crossings = trial.truth.zigzags[0].crossings_s
+    crossings = trial.truth.zigzags[0].executes_s[1:]
     start = trial.settings.start_utc_ns + round(crossings[0] * SECOND_NS)
     end = trial.settings.start_utc_ns + round(crossings[2 * ((len(crossings) - 1) // 2)] * SECOND_NS)
     found = {}

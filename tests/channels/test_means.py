@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.means import curve_of_means, mean_about
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 
 def utc(time_s: Float) -> Nanoseconds:

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 START = 1_746_252_000_000_000_000
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.rounding import rounding_std
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.channels.signal import signal
+from kempf.schemas.units import SECOND_NS
 
 
 def slow(period_s: float = 1.0, noise: float = 0.05, seed: int = 0) -> tuple[Series, np.ndarray]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.channels.spikes import without_spikes
+from kempf.schemas.units import SECOND_NS
 
 
 def test_spikes_go_and_are_counted_steps_stay() -> None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.channels.standing import without_noise
+from kempf.schemas.units import SECOND_NS
 
 NOISE = np.deg2rad(0.2)
 

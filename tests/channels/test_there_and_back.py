@@ -5,8 +5,9 @@ import polars as pl
 import pytest
 
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.channels.there_and_back import leaps
+from kempf.schemas.units import SECOND_NS
 
 RNG_SEED = 4
 #: -999 deg/min, which lies within the channel's range

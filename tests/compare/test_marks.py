@@ -10,7 +10,7 @@ from kempf.pipeline.compare.correlations import given_to
 from kempf.pipeline.compare.evidence import ITSELF, evidence_in
 from kempf.pipeline.compare.marks import MARKED, marks
 from kempf.pipeline.compare.misfit import where
-from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 from kempf.pipeline.predict.run_residuals import RunResiduals
 from tests.compare.test_where import RUN, looked
 
@@ -38,7 +38,7 @@ def test_a_tenth_of_the_instants_makes_most_of_a_correlation():
         marked = marks(runs, [one])[one.key]
         parts, lag = [], round(one.lag_s / RUN.step_s)
         for run in runs:
-            z = run.whitened[:, CHANNELS.index(one.channel)]
+            z = run.whitened[:, MEASUREMENTS.index(one.channel)]
             given = z if one.which == ITSELF else given_to(run.filtered.run)[one.which]
             parts.append(np.concatenate([np.full(lag, np.nan), z[lag:] * given[: given.size - lag]]))
         inside, each = np.concatenate(list(marked.values())), np.concatenate(parts)

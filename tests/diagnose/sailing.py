@@ -15,7 +15,7 @@ from benchmarks.diagnose.hidden_effects import programme, readings, sail
 from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, HiddenEffect
 from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
@@ -24,6 +24,7 @@ from kempf.pipeline.simulate.trial import Trial, TrialSettings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 
 CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
 #: some that a rudder, a hull and a sensor can have; the whole catalogue takes too long for a test

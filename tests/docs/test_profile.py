@@ -9,7 +9,6 @@ import pytest
 import yaml
 
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import Readings
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse
@@ -29,6 +28,7 @@ from kempf.schemas.profile import (
 from kempf.schemas.units import TO_SI
 from tests.docs.console import blocks
 from tests.ingest.test_mcap_messages import START, fix, header, imu, ros
+from tests.reading import read_log
 
 FOLDER = Path(__file__).parents[2] / "docs"
 TEXT = (FOLDER / "profile.md").read_text(encoding="utf-8")

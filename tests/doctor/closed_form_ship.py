@@ -8,8 +8,9 @@ from functools import cache
 import numpy as np
 
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.schemas.profile import ChannelMap, Source, TimeColumn, VesselProfile
+from kempf.schemas.units import SECOND_NS
 
 START_NS = 1_746_252_000_000_000_000
 STEP_S, LONG_S = 0.5, 1200.0

@@ -11,9 +11,9 @@ from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.corrections import Correction, put_into
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import ChannelMap, VesselProfile
 from tests.doctor import closed_form_ship
+from tests.reading import read_log
 
 
 def look(data: bytes, profile: VesselProfile) -> ExaminedLog:

@@ -11,7 +11,8 @@ from kempf.pipeline.channels.doctor.corrections import setting
 from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine, examine_window
 from kempf.pipeline.channels.doctor.faults import AXES, BOW_AND_COURSE, UNITS, Fault
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 from tests.doctor import closed_form_ship
 
 SWAP = Fault("swap", ("latitude", "longitude"))

@@ -9,9 +9,10 @@ import pytest
 
 from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination, examine
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome
+from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome
 from kempf.pipeline.channels.doctor.verdict import as_json
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 from tests.doctor import closed_form_ship
 
 STEP_S = 0.5
@@ -180,7 +181,7 @@ def test_every_correction_that_is_named_takes_its_contradiction_away() -> None:
 
 
 def test_what_no_single_correction_takes_away_is_said_with_its_figures() -> None:
-    figure = Figure("ratio", 3.0, 0.1, 0.8, 1.25)
+    figure = CheckFigure("ratio", 3.0, 0.1, 0.8, 1.25)
     outcome = Outcome("heading_rate", ("heading", "yaw_rate"), "disagree", "three times too much", (figure,))
     content = as_json(Examination((ChannelFinding((), (outcome,)),), (outcome,), ()), {}, "delimited")
     (finding,) = content["findings"]

@@ -7,7 +7,8 @@ import pytest
 
 from kempf.pipeline.channels.doctor.align import align
 from kempf.pipeline.channels.doctor.robust_regression import fit, posterior
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 
 def test_fit_is_least_squares_where_nothing_is_wild_and_forgets_what_is() -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import READING_SCHEMA
 from kempf.schemas.channels import CHANNEL_COLUMNS, CHANNELS
 from tests.doctor import closed_form_ship
+from tests.reading import read_log
 
 
 def columns(frame: pl.DataFrame, channel: str) -> tuple[np.ndarray, np.ndarray]:

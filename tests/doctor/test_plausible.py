@@ -17,11 +17,11 @@ from kempf.pipeline.channels.doctor.refused import by_channel, count
 from kempf.pipeline.channels.doctor.verdict import sentence
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from tests.doctor import closed_form_ship
+from tests.reading import read_log
 
 #: That the closed-form ship makes.
 SPEED_M_S = 6.0

@@ -8,12 +8,13 @@ from functools import lru_cache
 import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, Trial, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import SECOND_NS
 
 CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
 #: A force and a stream that do not change.

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.moves import moves, swing
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without
 
 TRIAL = sailed("ferry", seed=1, duration_s=400.0)

@@ -7,12 +7,13 @@ import pytest
 from scipy.signal import cont2discrete
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record import heel
 from kempf.pipeline.estimate.record.conditions import conditions
 from kempf.pipeline.estimate.record.grid_run import ShipConstants, make_run, plain_run
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without
 
 

@@ -12,19 +12,19 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, smooth
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.no_log.companions import Passage, check_engine, companions_of, has_log
 from kempf.pipeline.estimate.no_log.identify import SPEED_POWER, NoLogSettings, identify_without_log
+from kempf.pipeline.estimate.no_log.lateral_steps import SlowForces, lateral_steps
+from kempf.pipeline.estimate.no_log.longitudinal import PATH, SPEED, Surge, discretise_surge
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.estimate.search.starts import thinned
-from kempf.pipeline.model.lateral_steps import SlowForces, lateral_steps
-from kempf.pipeline.model.longitudinal import PATH, SPEED, Surge, discretise_surge
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
@@ -32,6 +32,7 @@ from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import instruments_of, truth_of, without
 
 SETTINGS = MaximumLikelihoodSettings()

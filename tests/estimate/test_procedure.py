@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from kempf.pipeline.estimate.paper.least_squares import Regression, regress
 from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedurePass, ProcedureSettings, iterate, judge
-from kempf.pipeline.model.vehicle import LinearVehicle, SlowDisturbance
+from kempf.pipeline.estimate.paper.vehicle import LinearVehicle, SlowDisturbance
 from kempf.schemas.errors import DataRejected, UsageError
 from tests.estimate.depth_channel import DEPTH_STATE, DepthChannel, DepthRecord, sail_depth
 

@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels import punctual
+from kempf.pipeline.channels import undelayed_speeds
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.sampled import sample
 from kempf.pipeline.estimate.search.starts import thinned
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without
 
 TRIAL = sailed("ferry", seed=1, duration_s=400.0)
@@ -194,7 +195,7 @@ def test_what_lateness_takes_is_the_difference_of_two_records(monkeypatch: pytes
     records = []
     for late_s in (0.3, 0.3 + 1e-4):
         found = Lateness(late_s, 0.05)
-        monkeypatch.setattr(punctual, "_velocity_lateness", lambda series, found=found: found)
+        monkeypatch.setattr(undelayed_speeds, "_velocity_lateness", lambda series, found=found: found)
         records.append(make_record(LOG, START, END))
     first, second = records
     assert first.lateral_by_late is not None

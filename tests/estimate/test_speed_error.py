@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.record.speed_error import rudder_of_speed_error
+from kempf.schemas.units import SECOND_NS
 from tests.estimate.simulated import record_of, sailed, truth_of
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.water_speed import water_speed
+from kempf.schemas.units import SECOND_NS
 
 LEG_S = 100.0
 

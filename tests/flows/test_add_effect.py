@@ -10,7 +10,7 @@ import pytest
 
 from kempf.flows.jobs import add_effect as job
 from kempf.flows.jobs import vessel_model
-from kempf.pipeline.diagnose import matters
+from kempf.pipeline.diagnose import improves_prediction
 from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting.ahead import Ahead
@@ -58,7 +58,7 @@ def test_an_effect_that_may_as_well_not_be_there_is_said_by_the_fit_that_predict
 
 
 def test_bounds_are_those_of_the_diagnosis() -> None:
-    assert (job.WORSE, job.LEAST_RISE) == (matters.WORSE, matters.LEAST_RISE)
+    assert (job.WORSE, job.LEAST_RISE) == (improves_prediction.WORSE, improves_prediction.LEAST_RISE)
 
 
 def test_a_worse_model_is_pointed_to_by_force_only(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -225,7 +225,7 @@ def test_bounds_that_are_none(warehouse: Warehouse) -> None:
 
 def test_a_manoeuvre_that_newer_code_does_not_find(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
     (zigzag,) = segments.current(warehouse, "mariner")
-    monkeypatch.setattr("kempf.flows.jobs.find_segments.find_manoeuvres", lambda *arguments: [])
+    monkeypatch.setattr("kempf.flows.jobs.find_segments.find_zigzags", lambda *arguments: [])
     with pytest.raises(NotFound, match="finds nothing any more") as gone:
         plan_for(warehouse, zigzag.segment_id, "exclude", "engine slowed")
     assert gone.value.code == "manoeuvre_gone" and corrections.all_of(warehouse) == []

@@ -8,7 +8,7 @@ import pytest
 
 from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
 from kempf.flows.jobs.one_sided import one_sided
-from kempf.pipeline.manoeuvre.prediction import Figure
+from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
 def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> MeasuredManoeuvre:
@@ -17,12 +17,12 @@ def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> Measure
     return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, 0.0, "held_out", every)
 
 
-def within(value: float | None, share: float) -> Figure:
+def within(value: float | None, share: float) -> PredictedFigure:
     """A predicted value with an interval of this share of it to both sides."""
     if value is None:
-        return Figure(None, None, None)
+        return PredictedFigure(None, None, None)
     low, high = sorted(((1.0 - share) * value, (1.0 + share) * value))
-    return Figure(value, low, high)
+    return PredictedFigure(value, low, high)
 
 
 def rates(factors: list[float]) -> list[MeasuredManoeuvre]:

@@ -15,7 +15,6 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import KEY, estimate_of
 from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
-from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.simulate.csv_log import to_csv
@@ -27,6 +26,7 @@ from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnose.hidden_effects.as_sold import as_sold
-from kempf.pipeline.simulate.instruments import SECOND_NS, Instrument, InstrumentRecord
+from kempf.pipeline.simulate.instruments import Instrument, InstrumentRecord
+from kempf.schemas.units import SECOND_NS
 
 
 def record(name: str, values: dict[str, np.ndarray], rate_hz: float = 1.0) -> InstrumentRecord:

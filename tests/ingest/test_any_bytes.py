@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from mcap.writer import Writer
 
 from benchmarks.ingest.fuzzing.oracles import check_ledgers
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 PROFILE = VesselProfile.model_validate(
     {

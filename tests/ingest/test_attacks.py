@@ -13,11 +13,11 @@ import pytest
 import zstandard
 
 from kempf.flows.jobs.files import opened_log, read_bytes, read_profiles
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.text.times import decimal_times
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile, parse
+from tests.reading import read_log
 
 HALF = b"2025-05-03T07:47:01.147Z $HEHDT,11.37,T*2B\n"
 

@@ -9,10 +9,10 @@ from mcap.stream_reader import StreamReader
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.stream import McapStream
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import CONTENTS, channel, message, variants, write
+from tests.reading import read_log
 
 START = 1_755_497_274_000_000_000
 PROFILE = VesselProfile.model_validate(

@@ -12,10 +12,10 @@ import pytest
 
 from kempf.pipeline.ingest import delimited
 from kempf.pipeline.ingest.quoting import inside_quotes
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.spans import lines_of
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 
 def profile(channels=None, time=None, **source):

@@ -11,11 +11,11 @@ import pytest
 
 from kempf.flows.jobs.draft_profile import draft
 from kempf.pipeline.ingest.encoding import utf16_of
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.test_delimited import T, profile
 from tests.ingest.test_nmea import stamped
+from tests.reading import read_log
 
 TEXT = f"utc,sog,hdg\r\n{T}1Z,10,90\r\n{T}2Z,11,91\r\n"
 NOTE = "The file is encoded as UTF-16, and was read so."

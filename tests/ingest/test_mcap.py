@@ -7,9 +7,9 @@ import math
 import pytest
 from mcap.writer import CompressionType, IndexType, Writer
 
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 START = 1_755_497_274_000_000_000
 CHANNELS = {

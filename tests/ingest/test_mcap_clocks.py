@@ -9,8 +9,8 @@ import pytest
 from mcap.writer import Writer
 
 from kempf.pipeline.ingest.mcap import decode
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 START = 1_746_252_000_000_000_000
 SECOND = 1_000_000_000

@@ -8,12 +8,12 @@ import pytest
 from mcap.writer import Writer
 from mcap_ros2.writer import Writer as RosWriter
 
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import UsageError
 from kempf.schemas.known_messages import OFFERED
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.ros_definitions import DEFINITIONS
 from tests.ingest.test_protobuf import described
+from tests.reading import read_log
 
 START = 1_755_497_274_000_000_000
 

@@ -11,11 +11,11 @@ from mcap.writer import Writer
 
 from kempf.flows.jobs.draft_profile import draft
 from kempf.flows.jobs.files import logs_in
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.test_mcap import START, plain, profile, read, write
 from tests.ingest.test_mcap_draft import ros
+from tests.reading import read_log
 
 HDT = "$HEHDT,20.00,T*2D"
 NOBODY = VesselProfile()

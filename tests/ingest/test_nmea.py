@@ -9,12 +9,12 @@ from kempf.pipeline.ingest.mapping import nmea_corrections
 from kempf.pipeline.ingest.nmea import frames as nmea_frames
 from kempf.pipeline.ingest.nmea.decode import decode
 from kempf.pipeline.ingest.nmea.frames import frames_of
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import Readings
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import as_bytes
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import ChannelMap, Source, VesselProfile
+from tests.reading import read_log
 
 KN = 1852 / 3600
 

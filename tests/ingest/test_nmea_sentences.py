@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from kempf.pipeline.ingest.decoded import CODE, Reason
 from kempf.pipeline.ingest.nmea.decode import decode
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.screen import Screen
 from kempf.schemas.profile import parse
+from tests.reading import read_log
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DEG, KN = math.pi / 180, 1852 / 3600

@@ -15,11 +15,11 @@ from polars.testing import assert_frame_equal
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.mcap import decode
-from kempf.pipeline.ingest.read import read_log, read_parts
-from kempf.pipeline.ingest.readings import joined
+from kempf.pipeline.ingest.read import read_parts
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.profile import Source, VesselProfile
+from tests.reading import joined, read_log
 
 START_NS = 1_755_497_274_000_000_000
 SECOND = 1_000_000_000

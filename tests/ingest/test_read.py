@@ -6,9 +6,9 @@ import pytest
 import zstandard
 
 from kempf.pipeline.ingest import unpack
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 NMEA = b"2025-05-03T07:47:01.148Z $HEHDT,11.37,T*2B\n2025-05-03T07:47:02.148Z $SDDPT,53.7,0.0*66\n"
 NOBODY = VesselProfile()

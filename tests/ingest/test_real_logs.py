@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import yaml
 
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import VesselProfile, parse
+from tests.reading import read_log
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT.parent / "shared"

@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile, parse
+from tests.reading import read_log
 
 WANTED = int(datetime(2025, 5, 3, 7, 47, 1, tzinfo=UTC).timestamp()) * 10**9
 

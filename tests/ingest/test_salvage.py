@@ -15,11 +15,11 @@ from kempf.pipeline.ingest import unpack
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap import records as mcap_records
 from kempf.pipeline.ingest.mcap.stream import McapStream
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import MAGIC, channel, chunk_record, index_records, message, record, text
 from tests.ingest.mcap_variants import summary as summary_of
+from tests.reading import read_log
 
 START = 1_755_497_274_000_000_000
 STEP = 10_000_000

@@ -13,14 +13,13 @@ import pytest
 from mcap.writer import Writer
 
 from kempf.pipeline.ingest.decoded import Decoded, Values
-from kempf.pipeline.ingest.read import read_log
-from kempf.pipeline.ingest.readings import joined
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.test_nmea import read as read_nmea
 from tests.ingest.test_nmea import stamped
 from tests.ingest.test_parts import START_NS, cut, equal
+from tests.reading import joined, read_log
 
 SECOND = 10**9
 

@@ -9,10 +9,10 @@ import pytest
 from mcap.writer import Writer
 
 from kempf.pipeline.ingest.mcap import decode
-from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.profile import VesselProfile, parse
 from tests.ingest.test_nmea import sentence
+from tests.reading import read_log
 
 SECOND = 10**9
 TRUE_START = 1_746_252_000 * SECOND

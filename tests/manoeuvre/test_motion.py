@@ -9,7 +9,7 @@ import pytest
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.pipeline.simulate import manoeuvre as sailed
@@ -30,7 +30,7 @@ def test_a_turning_circle_is_that_of_the_simulator(name: str, turns: float) -> N
     time = path.time_s[rows] - record.start_s
     truth = turning_figures(time, north, east, psi, np.hypot(forward, v), np.arctan2(-v, forward), 0.0)
     # by itself one is sailed until the turn is steady
-    made = TurningCircle(radians(25.0), turn_rad=3.0 * pi if turns == 1.5 else None).sailed(ship_of(hull))
+    made = PredictedCircle(radians(25.0), turn_rad=3.0 * pi if turns == 1.5 else None).sailed(ship_of(hull))
     assert made is not None
     for figure in ("advance_m", "transfer_m", "tactical_diameter_m", "steady_yaw_rate_deg_s", "time_to_180_s"):
         assert made.figures[figure] == pytest.approx(getattr(truth, figure), rel=2e-3), figure
@@ -73,7 +73,7 @@ def test_a_hull_that_turns_by_herself_without_damping_is_no_ship() -> None:
     ship = unstable(drag=0.0)
     assert ship.unstable
     assert not ship_of(HULLS["tanker"]).unstable
-    assert TurningCircle(radians(35.0)).sailed(ship) is None
+    assert PredictedCircle(radians(35.0)).sailed(ship) is None
     assert PullOut(radians(20.0)).sailed(ship) is None
     assert Spiral(radians(20.0)).sailed(ship) is None
 
@@ -198,7 +198,7 @@ def test_a_wind_that_changes_acts_when_it_blows() -> None:
 def test_a_slow_gear_makes_the_advance_longer_by_the_way_that_it_takes() -> None:
     ship = ship_of(HULLS["mariner"])
     fast, slow = (
-        TurningCircle(radians(35.0)).sailed(replace(ship, rudder_rate_rad_s=radians(rate))) for rate in (10.0, 2.5)
+        PredictedCircle(radians(35.0)).sailed(replace(ship, rudder_rate_rad_s=radians(rate))) for rate in (10.0, 2.5)
     )
     assert fast is not None
     assert slow is not None
@@ -209,7 +209,7 @@ def test_a_slow_gear_makes_the_advance_longer_by_the_way_that_it_takes() -> None
 
 def test_circle_pull_out_and_spiral_come_to_the_same_steady_turn() -> None:
     ship = ship_of(HULLS["ferry"])
-    circle, out, spiral = (one.sailed(ship) for one in (TurningCircle(0.35), PullOut(0.35), Spiral(0.35)))
+    circle, out, spiral = (one.sailed(ship) for one in (PredictedCircle(0.35), PullOut(0.35), Spiral(0.35)))
     assert circle is not None
     assert out is not None
     assert spiral is not None
@@ -226,6 +226,6 @@ def test_a_spiral_goes_on_where_more_rudder_turns_her_no_faster() -> None:
     assert made is not None
     rates = [made.figures[f"from_starboard_deg_s.{k}"] for k in range(4)]
     assert rates[0] < max(rates[1:])
-    hard = TurningCircle(radians(35.0)).sailed(slow)
+    hard = PredictedCircle(radians(35.0)).sailed(slow)
     assert hard is not None
     assert rates[0] == pytest.approx(hard.figures["steady_yaw_rate_deg_s"], rel=5e-3)

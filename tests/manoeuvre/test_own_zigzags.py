@@ -12,10 +12,11 @@ from kempf.pipeline.manoeuvre.own_zigzags import MOST, REFERENCE, held_against, 
 from kempf.pipeline.manoeuvre.ship import Ship
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.simulate.hulls import HULLS
+from kempf.schemas.confidence import NORMAL_95
 from tests.manoeuvre.ships import identified, ship_of
 
 
-def _overshoots(spread: float, half: float = 1.96, seed: int = 0) -> np.ndarray:
+def _overshoots(spread: float, half: float = NORMAL_95, seed: int = 0) -> np.ndarray:
     random = np.random.default_rng(seed)
     predicted = random.uniform(5.0, 20.0, 400)
     measured = predicted + spread * random.standard_normal(400)
@@ -31,7 +32,7 @@ def test_intervals_that_hold_what_they_should_scatter_nothing() -> None:
 
 def test_the_scatter_is_what_makes_the_intervals_hold() -> None:
     # errors of 1 deg, misses of 3: scatter has to give sqrt(8) deg, and gives 1.5 deg a reference
-    found = scatter(_overshoots(3.0), _overshoots(0.0, half=1.5 * 1.96))
+    found = scatter(_overshoots(3.0), _overshoots(0.0, half=1.5 * NORMAL_95))
     assert found == pytest.approx(REFERENCE * np.sqrt(8.0) / 1.5, rel=0.15)
     assert scatter(_overshoots(300.0), _overshoots(0.0)) == MOST
     said = replace(held_against(_overshoots(3.0), 200), scatter=found).sentence

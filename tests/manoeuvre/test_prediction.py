@@ -8,7 +8,7 @@ import pytest
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.prediction import predict
 from kempf.pipeline.manoeuvre.sailed import Reach
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.simulate.hulls import HULLS
@@ -16,7 +16,7 @@ from kempf.schemas.errors import DataRejected
 from tests.manoeuvre.ships import identified, ship_of, unstable
 
 LOGS = Reach(0.1, 0.3, radians(20.0), 7.0, 8.0)
-CIRCLE = TurningCircle(radians(25.0))
+CIRCLE = PredictedCircle(radians(25.0))
 
 
 def made(model: Identified, manoeuvre=CIRCLE, length: float | None = 160.93):  # type: ignore[no-untyped-def]
@@ -74,7 +74,7 @@ def test_the_interval_of_a_model_is_not_narrowed_by_surer_ones_beside_it() -> No
 def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> None:
     model = identified(ship_of(HULLS["mariner"]))
     circle = {
-        one.name: one for one in predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(160.93), 64).imo
+        one.name: one for one in predict([model], PredictedCircle(radians(35.0)), LOGS, Particulars(160.93), 64).imo
     }
     assert circle["advance"].limit == pytest.approx(4.5 * 160.93)
     assert circle["tactical diameter"].probability == 1.0
@@ -85,7 +85,7 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     blind = made(model, Zigzag(radians(10.0), radians(10.0)), None).imo
     assert all(one.probability is None and "length" in one.why for one in blind)
     assert made(model, Zigzag(radians(5.0), radians(15.0))).imo == ()
-    some = predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(389.0 / 4.5), 64).imo[0]
+    some = predict([model], PredictedCircle(radians(35.0)), LOGS, Particulars(389.0 / 4.5), 64).imo[0]
     assert some.probability is not None
     assert 0.0 < some.probability < 1.0
     assert "100 m" in some.why
@@ -94,7 +94,7 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     assert small["10/10 first overshoot"].probability is None
     assert "7 m long" in small["10/10 first overshoot"].why
     assert small["initial turning"].probability is not None
-    slow = predict([model], TurningCircle(radians(35.0)), LOGS, Particulars(160.93, 9.0), 64).imo[0]
+    slow = predict([model], PredictedCircle(radians(35.0)), LOGS, Particulars(160.93, 9.0), 64).imo[0]
     assert slow.probability == circle["advance"].probability
     assert "below 90 % of the trial speed 9 m/s" in slow.why
 

@@ -9,11 +9,12 @@ import pytest
 
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.plain_fit import fit_plain
-from kempf.pipeline.estimate.sensitivity import N_HULL, Point
+from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.next_trial.planned_run import as_predicted
 from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
 from kempf.schemas.effects import get
+from kempf.schemas.model_spec import N_HULL
 from tests.diagnose.sailing import WORKERS, sailed
 
 HULL = tuple(range(N_HULL))

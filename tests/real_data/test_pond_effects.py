@@ -11,9 +11,9 @@ from kempf.flows.jobs.diagnose_vessel import examine
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, known_effects
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import silent
+from kempf.pipeline.diagnose.improves_prediction import better_ahead
 from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.ladder_step import rung
-from kempf.pipeline.diagnose.matters import better_ahead
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import verdict

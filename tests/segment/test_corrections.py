@@ -7,13 +7,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.by_hand import zigzag_between
 from kempf.pipeline.segment.corrections import applied, same, standing
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 from tests.segment.nomoto import Instruments, Ship, measure
 
 
@@ -35,7 +36,7 @@ def said(action: str, subject: tuple[int, int], bounds: tuple[int, int] | None =
 @pytest.fixture(scope="module")
 def log() -> tuple[Series, Series, Zigzag]:
     heading, rudder = sailed()
-    (zigzag,) = find_manoeuvres(heading, rudder)
+    (zigzag,) = find_zigzags(heading, rudder)
     return heading, rudder, zigzag
 
 
@@ -102,7 +103,7 @@ def test_between_bounds_without_legs_is_no_zigzag(log: tuple[Series, Series, Zig
 def test_what_the_search_refuses_is_described_where_a_person_says_so() -> None:
     """The rudder is reversed at headings that agree with nothing: the search finds none."""
     heading, rudder = sailed(switching_deg=(20.0, 9.0, 31.0, 12.0, 25.0))
-    assert find_manoeuvres(heading, rudder) == []
+    assert find_zigzags(heading, rudder) == []
     zigzag = zigzag_between(heading, rudder, None, int(rudder.time_utc_ns[0]), int(rudder.time_utc_ns[-1]))
     assert len(zigzag.executes) >= 4 and zigzag.delta0_deg == 20.0
     assert np.isfinite(zigzag.psi0_deg)

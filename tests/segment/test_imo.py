@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.imo import judge, overshoot_limits
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.zigzag import SpeedConstancy, Zigzag
@@ -17,7 +17,7 @@ def zigzag(psi0: float, delta0: float, legs: int = 5) -> Zigzag:
     ship = Ship()
     ship.wait(0.0, 60.0)
     ship.zigzag(psi0, delta0, 1, legs)
-    return find_manoeuvres(*measure(ship, Instruments()))[0]
+    return find_zigzags(*measure(ship, Instruments()))[0]
 
 
 @pytest.mark.parametrize(

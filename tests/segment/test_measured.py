@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.zigzag import Zigzag
 from tests.segment.loading import Log, available, load
 
@@ -18,7 +18,7 @@ CALM = [name for name in TRIALS if "ekaterina" not in name]
 
 def zigzags(name: str) -> tuple[Log, list[Zigzag]]:
     log = load(name)
-    return log, find_manoeuvres(log.heading, log.rudder, log.speed)
+    return log, find_zigzags(log.heading, log.rudder, log.speed)
 
 
 def independent_start(log: Log, execute_ns: int) -> float:

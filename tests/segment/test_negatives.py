@@ -7,21 +7,21 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 
 def found_in(ship: Ship, instruments: Instruments | None = None) -> list[str]:
     heading, rudder = measure(ship, instruments or Instruments())
-    return [f"{z.kind} {z.psi0_deg:g}/{z.delta0_deg:g} n{len(z.executes)}" for z in find_manoeuvres(heading, rudder)]
+    return [f"{z.kind} {z.psi0_deg:g}/{z.delta0_deg:g} n{len(z.executes)}" for z in find_zigzags(heading, rudder)]
 
 
 def all_found_in(ship: Ship) -> list[object]:
     """Zigzags, and what else may be sailed."""
     heading, rudder = measure(ship, Instruments())
-    turning = find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
-    return [*find_manoeuvres(heading, rudder), *turning]
+    turning = find_circles_and_spirals(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
+    return [*find_zigzags(heading, rudder), *turning]
 
 
 @pytest.mark.parametrize("amplitude", [2.0, 3.0, 5.0, 8.0, 15.0])
@@ -127,7 +127,7 @@ def test_rudder_with_the_wrong_sign() -> None:
     ship.wait(0.0, 60.0)
     ship.zigzag(20.0, 20.0, 1, 6)
     heading, rudder = measure(ship, Instruments())
-    assert find_manoeuvres(heading, Series(rudder.time_utc_ns, -rudder.value)) == []
+    assert find_zigzags(heading, Series(rudder.time_utc_ns, -rudder.value)) == []
 
 
 def test_noise_only() -> None:
@@ -135,4 +135,4 @@ def test_noise_only() -> None:
     time = START_NS + np.arange(36000, dtype=np.int64) * 100_000_000
     heading = Series(time, np.deg2rad(random.standard_normal(time.size) * 0.3))
     rudder = Series(time, np.deg2rad(random.standard_normal(time.size) * 2.0))
-    assert find_manoeuvres(heading, rudder) == []
+    assert find_zigzags(heading, rudder) == []

@@ -7,8 +7,8 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
@@ -36,7 +36,7 @@ def found_in(
     series |= {"speed_through_water": constant(ship, 5.0) if speed is None else speed}
     series |= {} if shaft is None else {"shaft_speed": shaft}
     channels = Channels(series, {}, ())
-    before = [*(found := find_manoeuvres(heading, rudder)), *find_turning(channels, found)]
+    before = [*(found := find_zigzags(heading, rudder)), *find_circles_and_spirals(channels, found)]
     taken = [(one.start_utc_ns, one.end_utc_ns) for one in before]
     return find_random(channels, taken)
 

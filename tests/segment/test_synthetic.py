@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Float, Series
-from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.zigzag import Zigzag
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
@@ -27,7 +27,7 @@ def run(
     executes = vessel.zigzag(psi0, delta0, side, legs)
     vessel.wait(0.0, 60.0)
     heading, rudder = measure(vessel, instruments or Instruments(), rudder_zero)
-    return find_manoeuvres(heading, rudder), executes
+    return find_zigzags(heading, rudder), executes
 
 
 def errors(zigzag: Zigzag, executes: list[float]) -> Float:
@@ -99,7 +99,7 @@ def test_wind_that_turns_the_ship_makes_unlike_legs() -> None:
     vessel.autopilot(40.0, 400.0)
     executes = vessel.zigzag(10.0, 10.0, 1, 6)
     vessel.wait(0.0, 30.0)
-    found = find_manoeuvres(*measure(vessel, Instruments()))
+    found = find_zigzags(*measure(vessel, Instruments()))
     assert len(found) == 1
     assert (found[0].psi0_deg, found[0].delta0_deg, len(found[0].executes)) == (10, 10, 6)
     assert np.max(np.abs(errors(found[0], executes))) < 0.5
@@ -141,7 +141,7 @@ def test_overshoots_equal_those_of_the_noise_free_heading() -> None:
     executes = vessel.zigzag(20.0, 20.0, 1, 5)
     heading = np.array(vessel.log)[:, 0]
     time = np.arange(1, heading.size + 1) * 0.02
-    zigzag = find_manoeuvres(*measure(vessel, Instruments()))[0]
+    zigzag = find_zigzags(*measure(vessel, Instruments()))[0]
     for overshoot, begin, end, side in zip(
         zigzag.overshoots, executes[1:], [*executes[2:], time[-1]], [1, -1] * 3, strict=False
     ):
@@ -174,13 +174,13 @@ def test_speed_after_the_second_execute() -> None:
     seconds = np.arange(0.0, vessel.now)
     value = np.where(seconds < executes[1], 9.0, 8.0 - 0.001 * (seconds - executes[1]))
     speed = Series(START_NS + (seconds * 1e9).astype(np.int64), value)
-    found = find_manoeuvres(heading, rudder, speed)[0].speed
+    found = find_zigzags(heading, rudder, speed)[0].speed
     assert found is not None
     length = vessel.now - executes[1]
     assert found.approach_m_s == pytest.approx(9.0)
     assert found.mean_m_s == pytest.approx(8.0 - 0.0005 * length, abs=0.02)
     assert found.trend_percent == pytest.approx(-0.1 * length / found.mean_m_s, abs=0.3)
-    assert find_manoeuvres(heading, rudder)[0].speed is None
+    assert find_zigzags(heading, rudder)[0].speed is None
 
 
 def test_broken_off_after_the_second_execute_is_kept() -> None:
@@ -190,7 +190,7 @@ def test_broken_off_after_the_second_execute_is_kept() -> None:
     executes.append(vessel.now)
     vessel.wait(20.0, 60.0)
     vessel.autopilot(0.0, 200.0)
-    found = find_manoeuvres(*measure(vessel, Instruments()))
+    found = find_zigzags(*measure(vessel, Instruments()))
     assert len(found) == 1
     assert found[0].kind == "zigzag_broken_off"
     assert (found[0].psi0_deg, found[0].delta0_deg, found[0].first_side) == (20, 20, "port")
@@ -205,7 +205,7 @@ def test_two_zigzags_after_each_other() -> None:
     vessel.autopilot(90.0, 300.0)
     second = vessel.zigzag(10.0, 10.0, -1, 5)
     vessel.wait(0.0, 100.0)
-    found = find_manoeuvres(*measure(vessel, Instruments()))
+    found = find_zigzags(*measure(vessel, Instruments()))
     assert [(z.psi0_deg, z.delta0_deg, z.first_side) for z in found] == [(20, 20, "starboard"), (10, 10, "port")]
     assert np.max(np.abs(errors(found[0], first))) < 0.4
     assert np.max(np.abs(errors(found[1], second))) < 0.4
@@ -217,7 +217,7 @@ def test_log_that_begins_with_the_rudder_over() -> None:
     executes = vessel.zigzag(20.0, 20.0, 1, 8)
     heading, rudder = measure(vessel, Instruments())
     late = START_NS + round((executes[1] + 15.0) * 1e9)
-    found = find_manoeuvres(heading.between(late, 2**62), rudder.between(late, 2**62))
+    found = find_zigzags(heading.between(late, 2**62), rudder.between(late, 2**62))
     assert len(found) == 1
     assert found[0].quality.start == "unknown"
     assert any("approach" in reason for reason in found[0].quality.reasons)
@@ -237,12 +237,12 @@ def test_gap_within_a_leg_is_flagged_and_one_over_an_execute_breaks() -> None:
         return Series(series.time_utc_ns[keep], series.value[keep])
 
     middle = (executes[2] + executes[3]) / 2
-    found = find_manoeuvres(without(heading, middle - 4, middle + 4), rudder)
+    found = find_zigzags(without(heading, middle - 4, middle + 4), rudder)
     assert len(found) == 1
     assert found[0].quality.gap_s == pytest.approx(8.0, abs=0.5)
     assert any("not recorded" in reason for reason in found[0].quality.reasons)
     long = executes[3] - executes[2]
-    broken = find_manoeuvres(without(heading, middle - 0.8 * long, middle + 0.8 * long), rudder)
+    broken = find_zigzags(without(heading, middle - 0.8 * long, middle + 0.8 * long), rudder)
     assert all(len(zigzag.executes) < 6 for zigzag in broken)
 
 
@@ -252,9 +252,9 @@ def test_same_result_every_time() -> None:
 
 def test_empty_and_short_series_hold_no_zigzag() -> None:
     empty = Series(np.array([], dtype=np.int64), np.array([]))
-    assert find_manoeuvres(empty, empty) == []
+    assert find_zigzags(empty, empty) == []
     few = Series(np.arange(4, dtype=np.int64), np.zeros(4))
-    assert find_manoeuvres(few, few) == []
+    assert find_zigzags(few, few) == []
 
 
 def test_an_hour_at_ten_hertz_is_quick() -> None:
@@ -268,7 +268,7 @@ def test_an_hour_at_ten_hertz_is_quick() -> None:
     times = []
     for _ in range(3):
         start = perf_counter()
-        assert len(find_manoeuvres(*series)) == 1
+        assert len(find_zigzags(*series)) == 1
         times.append(perf_counter() - start)
     assert min(times) < 0.5
 
@@ -284,7 +284,7 @@ def test_four_legs_from_an_approach_that_was_not_steady_are_kept_and_labelled(
     vessel.wait(0.0, amidships_s)
     executes = vessel.zigzag(20.0, 20.0, 1, 4)
     vessel.wait(0.0, 60.0)
-    (zigzag,) = find_manoeuvres(*measure(vessel, Instruments()))
+    (zigzag,) = find_zigzags(*measure(vessel, Instruments()))
     assert (zigzag.kind, zigzag.psi0_deg, zigzag.delta0_deg) == ("zigzag", 20.0, 20.0)
     assert zigzag.quality.start == "turning"
     assert any("not steady" in reason for reason in zigzag.quality.reasons)
@@ -300,8 +300,8 @@ def test_a_rudder_that_reads_some_per_cent_off_changes_no_nominal_heading(factor
     vessel.wait(0.0, 100.0)
     vessel.zigzag(20.0, 20.0, 1, 6)
     heading, rudder = measure(vessel, Instruments())
-    true = find_manoeuvres(heading, rudder)[0]
-    found = find_manoeuvres(heading, Series(rudder.time_utc_ns, factor * rudder.value))[0]
+    true = find_zigzags(heading, rudder)[0]
+    found = find_zigzags(heading, Series(rudder.time_utc_ns, factor * rudder.value))[0]
     assert (found.psi0_deg, found.delta0_deg) == (20.0, 20.0)
     assert found.delta0_measured_deg == pytest.approx(factor * true.delta0_measured_deg, rel=1e-3)
     pairs = zip(found.overshoots, true.overshoots, strict=True)

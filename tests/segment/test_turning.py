@@ -11,20 +11,20 @@ import pytest
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.circle_drift import current_by_log
-from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
+from kempf.pipeline.segment.find_zigzags import find_zigzags
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.spiral import Spiral, SpiralPoint
 from kempf.pipeline.segment.turn_track import TurnTrack
-from kempf.pipeline.segment.turning_circle import TurningCircle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, direct_spiral
+from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse
 from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
 from tests.segment.nomoto import Instruments, Ship, measure
-from tests.segment.sailed import START_NS, instruments, sailed, true_circle
+from tests.segment.sailed import START_NS, direct_spiral, instruments, sailed, true_circle
 
 STREAM = Environment(current_north=Disturbance(0.5), current_east=Disturbance(-0.4))
 LENGTHS = ("advance_m", "transfer_m", "tactical_diameter_m")
@@ -33,15 +33,15 @@ LENGTHS = ("advance_m", "transfer_m", "tactical_diameter_m")
 UNSTABLE = {"straight": -0.5, "cubic": 1.0, "gain_per_s": 0.06}
 
 
-def circle_of(found: list[TurningCircle | PullOut | Spiral]) -> TurningCircle:
+def circle_of(found: list[MeasuredCircle | PullOut | Spiral]) -> MeasuredCircle:
     (circle,) = found
-    assert isinstance(circle, TurningCircle)
+    assert isinstance(circle, MeasuredCircle)
     return circle
 
 
-def tiny(ship: Ship, instruments: Instruments | None = None) -> list[TurningCircle | PullOut | Spiral]:
+def tiny(ship: Ship, instruments: Instruments | None = None) -> list[MeasuredCircle | PullOut | Spiral]:
     heading, rudder = measure(ship, instruments or Instruments())
-    return find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
+    return find_circles_and_spirals(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
 
 
 @pytest.mark.parametrize(("hull", "rudder"), [("ferry", 35.0), ("mariner", -20.0), ("usv", 20.0)])
@@ -49,7 +49,7 @@ def tiny(ship: Ship, instruments: Instruments | None = None) -> list[TurningCirc
 def test_figures_hold_the_truth_through_the_water(hull: str, rudder: float, environment: Environment) -> None:
     trial = sailed((SteadyCourse(60.0 if hull == "usv" else 300.0), Turn(rudder, 900.0)), hull, environment, seed=3)
     execute_s = trial.truth.manoeuvres[1].start_s
-    circle = circle_of(find_turning(instruments(trial)))
+    circle = circle_of(find_circles_and_spirals(instruments(trial)))
     assert circle.execute_utc_ns is not None
     assert (circle.execute_utc_ns - START_NS) / 1e9 == pytest.approx(execute_s, abs=0.3)
     assert (circle.side, circle.delta0_deg) == ("starboard" if rudder > 0 else "port", abs(rudder))
@@ -80,7 +80,7 @@ def test_figures_hold_the_truth_through_the_water(hull: str, rudder: float, envi
 def test_of_one_turn_the_water_log_shows_the_current(hull: str, rudder: float, turn_deg: float) -> None:
     trial = sailed((SteadyCourse(300.0), Turn(rudder, turn_deg)), hull, STREAM, seed=3)
     truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
-    circle = circle_of(find_turning(instruments(trial)))
+    circle = circle_of(find_circles_and_spirals(instruments(trial)))
     assert circle.measured.corrected
     assert any("water log shows a current of" in reason for reason in circle.quality.reasons)
     assert circle.measured.drift is not None
@@ -92,7 +92,7 @@ def test_of_one_turn_the_water_log_shows_the_current(hull: str, rudder: float, t
         assert abs(figure.value - truth[name]) < 3.0 * figure.std, name
     # over ground the tactical diameter is not hers
     assert circle.measured.over_ground["tactical_diameter_m"] != pytest.approx(truth["tactical_diameter_m"], rel=0.03)
-    without = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
+    without = circle_of(find_circles_and_spirals(instruments(trial, without=("speed_through_water",))))
     assert not without.measured.corrected
     assert without.measured.drift is None
 
@@ -104,7 +104,7 @@ def test_a_stable_ship_that_lags_behind_short_steps_has_no_loop(
 ) -> None:
     steps = direct_spiral((20.0, 15.0, 10.0, 5.0, 0.0, -5.0, -10.0, -15.0, -20.0), hold_s)
     trial = sailed((SteadyCourse(200.0), *steps, SteadyCourse(200.0)), hull, environment, seed=4)
-    (spiral,) = find_turning(instruments(trial))
+    (spiral,) = find_circles_and_spirals(instruments(trial))
     assert isinstance(spiral, Spiral)
     assert (spiral.loop, spiral.n_ways) == ("none seen", 2)
     # at the same rudder she comes to the same rate from either side
@@ -123,7 +123,7 @@ def test_the_rate_that_is_left_is_the_one_that_she_comes_to(hull: str, hold_s: f
     pull_out = HeldRudder(0.0, hold_s)
     programme = (SteadyCourse(200.0), Turn(15.0, 400.0), pull_out, SteadyCourse(400.0), Turn(-15.0, 400.0), pull_out)
     trial = sailed((*programme, SteadyCourse(200.0)), hull, PAPER_ENVIRONMENT, seed=1)
-    found = [one for one in find_turning(instruments(trial)) if isinstance(one, PullOut)]
+    found = [one for one in find_circles_and_spirals(instruments(trial)) if isinstance(one, PullOut)]
     assert [one.verdict for one in found] == ["no instability seen"] * 2
     for one in found:
         left, initial = one.figures["residual_yaw_rate_deg_s"], one.figures["initial_yaw_rate_deg_s"]
@@ -167,7 +167,7 @@ def test_noise_of_the_log_is_no_current() -> None:
 
 def test_without_a_log_the_drift_is_said_and_left_in() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry", STREAM)
-    circle = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
+    circle = circle_of(find_circles_and_spirals(instruments(trial, without=("speed_through_water",))))
     assert not circle.measured.corrected
     assert any("no water log shows a current" in reason for reason in circle.quality.reasons)
     truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
@@ -181,8 +181,8 @@ def test_without_a_log_the_drift_is_said_and_left_in() -> None:
 
 def test_velocities_without_positions_give_the_same_circle() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(-35.0, 900.0)), "ferry")
-    positions = circle_of(find_turning(instruments(trial)))
-    velocities = circle_of(find_turning(instruments(trial, without=("latitude", "longitude"))))
+    positions = circle_of(find_circles_and_spirals(instruments(trial)))
+    velocities = circle_of(find_circles_and_spirals(instruments(trial, without=("latitude", "longitude"))))
     assert velocities.measured.track == "speed and course over ground"
     for name in LENGTHS:
         one, other = positions.measured.figures[name].value, velocities.measured.figures[name].value
@@ -192,12 +192,12 @@ def test_velocities_without_positions_give_the_same_circle() -> None:
 def test_the_log_alone_and_the_compass_alone() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry")
     gnss = ("latitude", "longitude", "speed_over_ground", "course_over_ground")
-    logged = circle_of(find_turning(instruments(trial, without=gnss)))
+    logged = circle_of(find_circles_and_spirals(instruments(trial, without=gnss)))
     assert logged.measured.track == "speed through the water and heading"
     assert logged.measured.figures["advance_m"].value is not None
     assert logged.measured.figures["advance_m"].low is None
     assert logged.measured.figures["steady_drift_deg"].value is None
-    alone = circle_of(find_turning(instruments(trial, without=(*gnss, "speed_through_water"))))
+    alone = circle_of(find_circles_and_spirals(instruments(trial, without=(*gnss, "speed_through_water"))))
     assert alone.measured.track == "heading alone"
     assert alone.measured.figures["steady_yaw_rate_deg_s"].value == pytest.approx(
         logged.measured.figures["steady_yaw_rate_deg_s"].value, rel=1e-3
@@ -209,17 +209,17 @@ def test_the_log_alone_and_the_compass_alone() -> None:
 
 def test_half_a_turn_is_a_circle_and_says_what_it_lacks() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 200.0)), "ferry")
-    circle = circle_of(find_turning(instruments(trial)))
+    circle = circle_of(find_circles_and_spirals(instruments(trial)))
     assert circle.measured.figures["tactical_diameter_m"].value is not None
     assert circle.measured.figures["steady_diameter_m"].value is None
     assert circle.measured.figures["steady_diameter_m"].why == "the heading changed by less than a whole turn"
     assert any("less than 600 deg" in reason for reason in circle.quality.reasons)
-    assert find_turning(instruments(sailed((SteadyCourse(300.0), Turn(35.0, 150.0)), "ferry"))) == []
+    assert find_circles_and_spirals(instruments(sailed((SteadyCourse(300.0), Turn(35.0, 150.0)), "ferry"))) == []
 
 
 def test_the_criteria_ask_for_the_full_rudder_a_length_and_an_approach() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 560.0)), "ferry")
-    circle = circle_of(find_turning(instruments(trial)))
+    circle = circle_of(find_circles_and_spirals(instruments(trial)))
     judged = {c.name: c for c in judge_circle(circle, Particulars(140.0, 10.0))}
     truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
     assert judged["advance"].value_lengths == pytest.approx(truth["advance_m"] / 140.0, rel=0.03)
@@ -228,7 +228,7 @@ def test_the_criteria_ask_for_the_full_rudder_a_length_and_an_approach() -> None
     assert "length" in judge_circle(circle, Particulars(None, 10.0))[0].why
     assert "m long" in judge_circle(circle, Particulars(99.0, 10.0))[0].why
     assert "below 90 %" in judge_circle(circle, Particulars(140.0, 12.0))[0].why
-    small = circle_of(find_turning(instruments(sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry"))))
+    small = circle_of(find_circles_and_spirals(instruments(sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry"))))
     assert "asks for 35 deg" in judge_circle(small, Particulars(140.0, 10.0))[0].why
 
 
@@ -236,12 +236,12 @@ def test_a_log_that_begins_in_the_turn_has_no_advance() -> None:
     whole = instruments(sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry"))
     late_ns = START_NS + 330_000_000_000
     cut = Channels({k: s.between(late_ns, s.time_utc_ns[-1]) for k, s in whole.series.items()}, {}, ())
-    circle = circle_of(find_turning(cut))
+    circle = circle_of(find_circles_and_spirals(cut))
     assert circle.quality.start == "unknown"
     assert circle.execute_utc_ns is None
     assert circle.measured.figures["advance_m"].value is None
     assert circle.measured.figures["speed_loss_percent"].value is None
-    complete = circle_of(find_turning(whole))
+    complete = circle_of(find_circles_and_spirals(whole))
     assert circle.measured.figures["steady_yaw_rate_deg_s"].value == pytest.approx(
         complete.measured.figures["steady_yaw_rate_deg_s"].value, rel=0.01
     )
@@ -255,10 +255,10 @@ def test_zigzags_are_not_touched_and_nothing_is_found_twice() -> None:
     ship.wait(25.0, 500.0)
     ship.wait(0.0, 100.0)
     heading, rudder = measure(ship, Instruments())
-    zigzags = find_manoeuvres(heading, rudder)
-    found = find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()), zigzags)
+    zigzags = find_zigzags(heading, rudder)
+    found = find_circles_and_spirals(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()), zigzags)
     assert [z.kind for z in zigzags] == ["zigzag"]
-    assert [type(one) for one in found] == [TurningCircle, PullOut]
+    assert [type(one) for one in found] == [MeasuredCircle, PullOut]
     spans = [(z.start_utc_ns, z.end_utc_ns) for z in [*zigzags, *found]]
     assert all(end <= start for (_, end), (start, _) in pairwise(sorted(spans)))
 
@@ -266,8 +266,8 @@ def test_zigzags_are_not_touched_and_nothing_is_found_twice() -> None:
 def test_pull_outs_of_a_stable_ship_end_alike() -> None:
     steps = [(SteadyCourse(300.0), Turn(side * 20.0, 400.0), HeldRudder(0.0, 200.0)) for side in (1.0, -1.0)]
     trial = sailed((*steps[0], *steps[1]), "ferry")
-    found = find_turning(instruments(trial))
-    assert [type(one) for one in found] == [TurningCircle, PullOut] * 2
+    found = find_circles_and_spirals(instruments(trial))
+    assert [type(one) for one in found] == [MeasuredCircle, PullOut] * 2
     first, second = (one for one in found if isinstance(one, PullOut))
     assert (first.side, second.side) == ("starboard", "port")
     assert first.verdict == second.verdict == "no instability seen"
@@ -311,7 +311,7 @@ def test_one_pull_out_is_not_judged_and_a_short_one_is_none() -> None:
 def test_spiral_of_a_stable_ship_has_no_loop() -> None:
     angles = (15.0, 10.0, 5.0, 2.0, 0.0, -2.0, -5.0, -10.0, -15.0)
     trial = sailed((SteadyCourse(120.0), *direct_spiral(angles, 150.0)), "ferry")
-    (spiral,) = find_turning(instruments(trial))
+    (spiral,) = find_circles_and_spirals(instruments(trial))
     assert isinstance(spiral, Spiral)
     assert (spiral.loop, spiral.n_ways, spiral.side) == ("none seen", 2, "starboard")
     assert [p.rudder_deg for p in spiral.points] == pytest.approx([*angles, *angles[-2::-1]], abs=0.2)
@@ -407,8 +407,8 @@ def test_speeds_of_nought_and_a_compass_that_fails_stop_nothing() -> None:
     heading, rudder = measure(ship, Instruments())
     still = Series(heading.time_utc_ns, np.zeros(len(heading)))
     channels = {"heading": heading, "rudder_angle": rudder, "speed_over_ground": still, "course_over_ground": still}
-    for one in find_turning(Channels(channels, {}, ())):
-        assert isinstance(one, TurningCircle)
+    for one in find_circles_and_spirals(Channels(channels, {}, ())):
+        assert isinstance(one, MeasuredCircle)
         assert one.measured.figures["speed_loss_percent"].value is None
     early = heading.between(START_NS, START_NS + 150_000_000_000)
-    assert find_turning(Channels({"heading": early, "rudder_angle": rudder}, {}, ())) == []
+    assert find_circles_and_spirals(Channels({"heading": early, "rudder_angle": rudder}, {}, ())) == []

@@ -10,10 +10,11 @@ import yaml
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
-from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, TurningCircle, ZigzagTest, direct_spiral
+from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
 from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.store import Warehouse
+from tests.segment.sailed import direct_spiral
 from tests.workbench.driving import Ran, kempf
 
 ANGLES = (15.0, 8.0, 3.0, 0.0, -3.0, -8.0, -15.0)

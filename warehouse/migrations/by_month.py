@@ -13,8 +13,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from kempf.schemas.instants import month_of
 from kempf.warehouse import delta, logs, purges
-from kempf.warehouse.instant import month_of
 from kempf.warehouse.migrations import commits
 from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import scanned

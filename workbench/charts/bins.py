@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 Places = NDArray[np.int64]
 #: lengths of blocks whose extremes alone are looked at, where two of them fit into a bin; short ones cost more

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kempf.schemas.enumeration import as_words
+from kempf.schemas.enumeration import as_words, counted
 from kempf.schemas.errors import ThresholdExceeded, UsageError
+from kempf.schemas.motion_channel import MOTION
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
@@ -23,7 +24,6 @@ from kempf.workbench.terminal import print_json, print_note, print_table, progre
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
 
-_CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
 #: probability below which a band or a correlation is shown
 _LEVEL = 0.01
 #: fit, %, below which the number of a fit says nothing: the error is twice the motion
@@ -162,10 +162,10 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     if mean is None:
         click.echo(click.style(f"{title}: no manoeuvre", bold=True))
         return
-    there = [name for name in _CHANNELS if name in mean["fit_percent"]]
+    there = [name for name in MOTION if name in mean["fit_percent"]]
     head = ["manoeuvre", "what", "start UTC"]
     for name in there:
-        head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_display'][name]['unit']}"]
+        head += [f"{MOTION[name].words} fit %", f"rms {mean['rms_display'][name]['unit']}"]
     head += ["largest free-run overshoot error deg"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
@@ -175,7 +175,7 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
             row += [_percent(run["fit_percent"].get(name)), number(run["rms_display"].get(name, {}).get("value"), 3)]
         errors = [error for error in run["overshoot_error_deg"] if error is not None]
         rows.append([*row, _signed(max(errors, key=abs, default=None))])
-    print_table(head, rows, f"{title}: {len(runs)} manoeuvre{'s' if len(runs) > 1 else ''}")
+    print_table(head, rows, f"{title}: {counted(len(runs), 'manoeuvre')}")
     for run in runs if verbose else ():
         every = " ".join(_signed(error) for error in run["overshoot_error_deg"])
         click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
@@ -190,7 +190,7 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
         )
     inside = mean["inside_95_percent"]
     if inside:
-        shares = [f"{_CHANNELS[name]} {100 * inside[name]['share']:.1f} %" for name in there if name in inside]
+        shares = [f"{MOTION[name].words} {100 * inside[name]['share']:.1f} %" for name in there if name in inside]
         click.echo(f"  inside the 95 % interval: {', '.join(shares)}")
     likelihood, legs = mean["free_run_error_percent"], mean["free_run_error_percent_fitted_to_legs"]
     if not legs:
@@ -207,11 +207,11 @@ def _fits_together(runs: list[dict[str, Any]], mean: dict[str, Any], there: list
     if off:
         known = {name: [run["fit_percent"][name] for run in runs if name in run["fit_percent"]] for name in there}
         middle = {name: median(fits) for name, fits in known.items()}
-        parts = [f"{_CHANNELS[name]} {_percent(fit)} %" for name, fit in middle.items()]
+        parts = [f"{MOTION[name].words} {_percent(fit)} %" for name, fit in middle.items()]
         many = f"{off} of {len(runs)} have a fit below {_WORST_FIT:g} %"
         return f"median fit: {', '.join(parts)}; {many}, so that a mean says nothing"
     fits = [mean[name] for name in there]
-    parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
+    parts = [f"{MOTION[name].words} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
     quoted_as = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
     return f"mean fit{quoted_as}: {', '.join(parts)}"
 
@@ -222,7 +222,7 @@ def _print_where(title: str, where: dict[str, Any]) -> None:
         click.echo("  no phase, side, bin or manoeuvre stands out from what a right model leaves")
     rows = [
         [
-            _CHANNELS[group["channel"]],
+            MOTION[group["channel"]].words,
             f"{as_words(group['of'].removeprefix('by_'))}: {as_words(group['which'])}",
             f"{group['n']}",
             f"{group['whitened_rms']:.2f}",
@@ -238,14 +238,14 @@ def _print_where(title: str, where: dict[str, Any]) -> None:
         if out:
             most = max(out, key=lambda b: float(b["ratio"]))
             click.echo(
-                f"  {_CHANNELS[channel]}: {most['ratio']:.1f} times the power of white noise between "
+                f"  {MOTION[channel].words}: {most['ratio']:.1f} times the power of white noise between "
                 f"{most['low_hz']:g} and {most['high_hz']:g} Hz, most at {most['peak_hz']:.3g} Hz"
             )
     for channel, correlations in where["correlations"].items():
-        _print_correlation(_CHANNELS[channel], correlations)
+        _print_correlation(MOTION[channel].words, correlations)
     short = short_ids(w["run"] for w in where["worst"])
     rows = [
-        [w["start"][:19], w["end"][11:19], short[w["run"]], _CHANNELS[w["channel"]], w["measure"], _size(w)]
+        [w["start"][:19], w["end"][11:19], short[w["run"]], MOTION[w["channel"]].words, w["measure"], _size(w)]
         for w in where["worst"]
     ]
     print_table(["start UTC", "end", "manoeuvre", "channel", "horizon", "error"], rows, "  worst windows")

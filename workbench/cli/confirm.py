@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
-from kempf.workbench.terminal import counted
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.affected_sets import Affected

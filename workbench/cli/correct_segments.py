@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.instants import utc_ns_of
-from kempf.workbench.terminal import counted, one_line, print_json, print_table
+from kempf.workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.correct_segments import Planned
@@ -100,8 +101,8 @@ def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_jso
 @json_option
 def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     """List every correction that was made, with its reason and when."""
+    from kempf.schemas.instants import iso_utc
     from kempf.warehouse import append_only, corrections, logs, vessels
-    from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -173,7 +174,7 @@ def _words(planned: Planned) -> str:
 
 
 def _described(segment: Segment) -> str:
-    from kempf.warehouse.instant import iso_utc
+    from kempf.schemas.instants import iso_utc
 
     span = f"{iso_utc(segment.start_utc_ns)[:19]} to {iso_utc(segment.end_utc_ns)[:19]}"
     return f"{segment.segment_id} ({segment.words}, {span})"

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kempf.schemas.enumeration import as_words
+from kempf.schemas.enumeration import as_words, counted
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import FREE, LEG, percents, print_by_legs
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.effect_verdicts import effect_verdict
 from kempf.workbench.numbers import number, percent
 from kempf.workbench.rungs import compared, first_model
-from kempf.workbench.terminal import counted, print_json, print_table, progress_bar
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse

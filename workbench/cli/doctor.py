@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, profile_option, warehouse_option
 from kempf.workbench.numbers import number
@@ -55,7 +56,7 @@ def command(
 def print_examination(name: str, content: dict[str, Any], *, everything: bool) -> None:
     """Print a verdict with its evidence and the lines that correct it."""
     findings = content["findings"]
-    many = f"{len(findings)} contradiction{'' if len(findings) == 1 else 's'} between its channels"
+    many = f"{counted(len(findings), 'contradiction')} between its channels"
     verdict = content["verdict"]
     head = "partly tested" if verdict == "clean" and content["untested"] else verdict
     click.echo(f"{one_line(name)}: {_HEADS[head].format(many)}")

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.motion_channel import MOTION
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
@@ -128,12 +129,10 @@ def add(
 
 def _print_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
     """Print the free-run errors manoeuvre by manoeuvre, before and after, fitted and held out apart."""
-    from math import degrees
-
     if compared([before, after])[-1].by_legs:
         _print_legs(before, after)
         return
-    units = {"yaw_rate": ("deg/s", degrees(1.0)), "heading": ("deg", degrees(1.0)), "lateral_speed": ("m/s", 1.0)}
+    units = {name: channel.shown for name, channel in MOTION.items()}
     rows = []
     for sample, key in (("fitted", "in_sample"), ("held out", "held_out")):
         for name, rms in before[key].items():

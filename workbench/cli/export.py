@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, output_option, set_argument, vessel_option, warehouse_option
-from kempf.workbench.terminal import counted, print_json, print_note, progress_bar
+from kempf.workbench.terminal import print_json, print_note, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, output_option, vessel_option, warehouse_option
 from kempf.workbench.instants import end_of
 from kempf.workbench.new_file import require_figures, require_new, writing
 from kempf.workbench.numbers import number
-from kempf.workbench.terminal import counted, print_json, print_note, print_paragraph, print_table, short_ids
+from kempf.workbench.terminal import print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
     from datetime import datetime

@@ -10,12 +10,13 @@ import click
 
 from kempf.flows.process.progress import Progress
 from kempf.pipeline.estimate.names import NAMES
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import print_parameter_set
 from kempf.workbench.ranked_warnings import MOST
-from kempf.workbench.terminal import counted, print_json, progress_bar
+from kempf.workbench.terminal import print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, new_vessel_option, verbose_option, warehouse_option
-from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+from kempf.workbench.terminal import one_line, print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.take_inbox import InboxRun

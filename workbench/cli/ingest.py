@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import (
     json_option,
@@ -19,7 +20,7 @@ from kempf.workbench.cli.options import (
     warehouse_option,
 )
 from kempf.workbench.ranked_warnings import of_several, show_warnings
-from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+from kempf.workbench.terminal import one_line, print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest_logs import IngestOutcome

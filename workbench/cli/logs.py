@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kempf.schemas.enumeration import as_words
+from kempf.schemas.enumeration import as_words, counted
 from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import (
@@ -95,7 +95,7 @@ def _brief(channels: Any) -> str:
     if channels is None:
         return "-"
     many = len(channels["findings"])
-    return channels["verdict"] if not many else f"{many} fault{'' if many == 1 else 's'}"
+    return channels["verdict"] if not many else counted(many, "fault")
 
 
 @command.command("show")

@@ -75,7 +75,7 @@ def command(
 
 def words_of(note: Note) -> str:
     """Return a note as one line."""
-    from kempf.warehouse.instant import iso_utc
+    from kempf.schemas.instants import iso_utc
 
     when = f"{iso_utc(note.event_utc_ns)[:10]}: " if note.event_utc_ns is not None else ""
     on = "" if note.subject == "vessel" else f" ({note.subject} {note.subject_id[:20]})"

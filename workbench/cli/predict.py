@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from kempf.flows.jobs.predict_request import Kind, PredictRequest, Side, angles_of
-from kempf.schemas.enumeration import as_words
+from kempf.flows.jobs.predict_request import Kind, PredictRequest, angles_of
+from kempf.schemas.enumeration import as_words, counted
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words, scaled
@@ -21,7 +22,7 @@ from kempf.workbench.terminal import print_json, print_paragraph, print_table, p
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
     from kempf.flows.jobs.predicted import Predicted
-    from kempf.pipeline.manoeuvre.prediction import Figure
+    from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
 @click.command("predict", cls=GivenOnce)
@@ -99,8 +100,8 @@ def command(
             by_option = ", ".join(f"{count} with {option}" for option, count in others.items())
             print_paragraph(f"not compared, as they are of other angles: {by_option}")
         if not compare and manoeuvre != "zigzag" and (count := measured_kind(Warehouse(uri), predicted)):
-            words = f"{manoeuvre.replace('-', ' ')}{'s' if count > 1 else ''}"
-            print_paragraph(f"measured: {count} {words}; --compare lays the prediction over those of this rudder")
+            measured_ones = counted(count, manoeuvre.replace("-", " "))
+            print_paragraph(f"measured: {measured_ones}; --compare lays the prediction over those of this rudder")
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:
@@ -153,7 +154,7 @@ def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
         click.echo(f"  drawn: {figure}")
 
 
-def _row(name: str, figure: Figure, manoeuvre: dict[str, Any], model_scale: float | None) -> list[str]:
+def _row(name: str, figure: PredictedFigure, manoeuvre: dict[str, Any], model_scale: float | None) -> list[str]:
     base, _, place = name.partition(".")
     words, unit = in_words(base, int(place) if place else None, manoeuvre), FIGURES[base][1]
     if figure.value is None:

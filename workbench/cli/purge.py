@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, warehouse_option
-from kempf.workbench.terminal import counted, one_line, print_json
+from kempf.workbench.terminal import one_line, print_json
 
 
 @click.command("purge", cls=GivenOnce)

@@ -6,11 +6,12 @@ import sys
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
 from kempf.workbench.cli.confirm import confirm, yes_option
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, warehouse_option
-from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+from kempf.workbench.terminal import one_line, print_json, progress_bar
 
 
 @click.command("repair", cls=GivenOnce)

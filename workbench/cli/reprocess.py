@@ -39,7 +39,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
     process, and no server is started. Vessels of which nothing changed since their last run are not looked at again;
     a single one that is named is.
     """
-    from kempf.flows.fleet.report import beyond, counted
+    from kempf.flows.fleet.report import beyond, findings_in_words
     from kempf.flows.jobs.files import read_quality
     from kempf.schemas.quality import NO_LIMITS
     from kempf.warehouse import vessels
@@ -77,7 +77,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
             for failure in report["failures"]:
                 click.echo(f"{report['vessel']}, {failure['what']}: {failure['error']['message']}", err=True)
             if report["findings"]:
-                click.echo(f"{report['vessel']}: {counted(report)}", err=True)
+                click.echo(f"{report['vessel']}: {findings_in_words(report)}", err=True)
     if any(report["failures"] for report in reports):
         sys.exit(DataRejected.exit_code)
     if bad:

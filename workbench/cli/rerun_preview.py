@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected, ThresholdExceeded
 from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table, progress_bar
@@ -68,7 +69,7 @@ def _print_adopted(adopted: Sequence[Equivalent]) -> None:
     for equivalent in adopted:
         click.echo(
             f"adopted: {equivalent.stage} code {equivalent.code} counts as {equivalent.stands_for}, on the evidence of "
-            f"{equivalent.sets} sets of {len(equivalent.vessels)} vessel{'' if len(equivalent.vessels) == 1 else 's'}"
+            f"{equivalent.sets} sets of {counted(len(equivalent.vessels), 'vessel')}"
         )
 
 

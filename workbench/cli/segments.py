@@ -81,7 +81,7 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
 
 def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str], file_of: Mapping[str, str]) -> None:
     """Print a table, a zigzag a row; with the log where those of several logs begin alike."""
-    from kempf.warehouse.instant import iso_utc
+    from kempf.schemas.instants import iso_utc
     from kempf.workbench.documents.manoeuvres import logs_begin_alike
 
     by_vessel: dict[str, list[tuple[str, str]]] = {}
@@ -117,7 +117,7 @@ def _overshoots(angles_deg: Sequence[float]) -> str:
 
 def _print_other(segment: Segment, short: str) -> None:
     """Print a manoeuvre that is no zigzag: what it was, then a figure a line, 95 % intervals in brackets."""
-    from kempf.warehouse.instant import iso_utc
+    from kempf.schemas.instants import iso_utc
     from kempf.workbench.cli.manoeuvre_words import figures, headline
 
     start = iso_utc(segment.start_utc_ns)[:16]

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
 from kempf.workbench.numbers import number
-from kempf.workbench.terminal import counted, print_json, print_table
+from kempf.workbench.terminal import print_json, print_table
 
 
 @click.group("vessels", cls=GivenOnceGroup)

@@ -8,9 +8,9 @@ from typing import Any
 
 from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
 from kempf.pipeline.ingest.decoded import LostStretch
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import examinations, logs, lost, vessels
 from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import aliases, parameter_sets, vessels
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
 
 

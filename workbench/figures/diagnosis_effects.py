@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from kempf.schemas.confidence import NORMAL_95
 from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.figures.diagnosis_style import INK, SET_COLOURS, new_figure, style
 from kempf.workbench.numbers import with_error
 
 _SHOWN, _OTHER = 14, "#a5a6a8"
 #: expected sizes further from 0 than this many standard errors are drawn at the edge
-_WIDEST, _WIDTH_95 = 25.0, 1.96
+_WIDEST = 25.0
 
 
 def draw_effects(ranked: Sequence[EffectRow]) -> Any:
@@ -43,7 +44,7 @@ def draw_effects(ranked: Sequence[EffectRow]) -> Any:
                 z = float(np.clip(change.value / change.std, -_WIDEST, _WIDEST))
                 widest = max(widest, abs(z) + 2.5)
                 shift = 0.0 if len(changes) == 1 else 0.22 - 0.44 * k
-                bars = {"xerr": _WIDTH_95, "fmt": "o", "ms": 4, "ecolor": INK, "elinewidth": 1, "capsize": 2}
+                bars = {"xerr": NORMAL_95, "fmt": "o", "ms": 4, "ecolor": INK, "elinewidth": 1, "capsize": 2}
                 size.errorbar([z], [y + shift], color=colour, **bars)
                 side = -1 if z > 0.0 else 1
                 size.annotate(

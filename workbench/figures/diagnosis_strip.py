@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
 from kempf.workbench.figures.diagnosis_style import (
     CHANNELS,
@@ -19,7 +20,7 @@ from kempf.workbench.figures.diagnosis_style import (
     style,
 )
 
-_LIMIT, _WIDTH_95 = 5.0, 1.96
+_LIMIT = 5.0
 _ORDER = (2, 1, 0)
 
 
@@ -41,7 +42,7 @@ def draw_strip(shown: ManoeuvreEvidence, first: str, last: str) -> Any:
             for phase in shown.phases:
                 if phase.name in PHASE_COLOURS:
                     panel.axvspan(phase.start_s, phase.end_s, color=PHASE_COLOURS[phase.name], lw=0, zorder=0)
-            for level in (-_WIDTH_95, _WIDTH_95):
+            for level in (-NORMAL_95, NORMAL_95):
                 panel.axhline(level, color=FAINT, lw=0.8, ls="--", zorder=1)
             _dots(panel, shown.time_s, shown.before.whitened[:, i], PLAIN, "x", first)
             if shown.after is not None:

@@ -9,9 +9,10 @@ import numpy as np
 
 from kempf.flows.jobs.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
-from kempf.pipeline.channels.doctor.outcome import Figure
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.doctor.outcome import CheckFigure
+from kempf.pipeline.channels.series import Float, Nanoseconds
 from kempf.schemas.enumeration import as_words
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.figures.drawn import pyplot, save
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def draw(examined_log: ExaminedLog, path: Path) -> None:
     save(sheet, path, 110)
 
 
-def _forest(panel: Axes, rows: list[tuple[Any, Figure]]) -> None:
+def _forest(panel: Axes, rows: list[tuple[Any, CheckFigure]]) -> None:
     """Draw each figure between what is expected, which is scaled to -1 to 1; beyond 4 it is drawn at the edge."""
     for k, (outcome, figure) in enumerate(rows):
         middle, half = _band(figure)
@@ -75,7 +76,7 @@ def _forest(panel: Axes, rows: list[tuple[Any, Figure]]) -> None:
     panel.set_title("values with bars of 4 s.e. (numbers: ± 1 s.e.); grey: expected range", fontsize=9)
 
 
-def _band(figure: Figure) -> tuple[float, float]:
+def _band(figure: CheckFigure) -> tuple[float, float]:
     if not np.isfinite(figure.high):
         # one-sided: nought is the lower edge
         scale = max(abs(figure.value), 4.0 * figure.std, 1e-12)

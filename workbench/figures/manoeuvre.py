@@ -9,7 +9,7 @@ import numpy as np
 
 from kempf.pipeline.manoeuvre.prediction import Prediction
 from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.workbench.figures.diagnosis_style import FAINT, FULL, INK, LIMIT, new_figure, style
 from kempf.workbench.figures.drawn import save
@@ -29,11 +29,11 @@ def draw_manoeuvre(prediction: Prediction, path: Path, title: str = "") -> None:
         Above the figure.
     """
     with style():
-        figure = new_figure(6.4 if isinstance(prediction.manoeuvre, TurningCircle) else 4.2)
+        figure = new_figure(6.4 if isinstance(prediction.manoeuvre, PredictedCircle) else 4.2)
         figure.set_facecolor("white")
         panel = figure.subplots()
         figure.suptitle(title, x=0.02, ha="left", fontsize=9.5)
-        if isinstance(prediction.manoeuvre, TurningCircle):
+        if isinstance(prediction.manoeuvre, PredictedCircle):
             _circle(panel, prediction)
         elif isinstance(prediction.manoeuvre, Zigzag):
             _zigzag(panel, prediction, prediction.manoeuvre)

@@ -9,16 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.pipeline.compare.comparison import ORDER, ComparedRun
-from kempf.pipeline.compare.group import UNITS
-from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.prediction import WIDTH_95
+from kempf.pipeline.compare.comparison import ComparedRun
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
+from kempf.schemas.confidence import NORMAL_95
+from kempf.schemas.motion_channel import MOTION
 from kempf.workbench.figures.drawn import save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_NAMES = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
 #: of Okabe & Ito (2008), which the colour-blind can distinguish: predicted, and badges of held-out and fitted runs
 _PREDICTED, _HELD_OUT, _FITTED = "#0072B2", "#D55E00", "#555555"
 
@@ -34,7 +33,7 @@ def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    there = [name for name in ORDER if any(name in run.predicted.count() for run in runs)]
+    there = [name for name in MOTION if any(name in run.predicted.count() for run in runs)]
     figure = Figure(figsize=(4.4 * len(there) + 0.4, 2.9 * len(runs) + 0.9), layout="constrained")
     FigureCanvasAgg(figure)
     heights = [3.0, 1.0] * len(runs)
@@ -62,14 +61,14 @@ def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
 
 
 def _panel(panel: Any, run: ComparedRun, name: str) -> None:
-    prediction, i = run.predicted, CHANNELS.index(name)
-    unit, factor = UNITS[name]
+    prediction, i = run.predicted, MEASUREMENTS.index(name)
+    unit, factor = MOTION[name].shown
     measured = factor * run.residuals.filtered.run.measured[:, i]
     known = np.isfinite(measured)
     panel.plot(prediction.time_s[known], measured[known], color="0.55", lw=2.2, label="measured")
     predicted = factor * prediction.predicted[:, i]
     if np.isfinite(prediction.std[:, i]).any():
-        width = factor * WIDTH_95 * prediction.std[:, i]
+        width = factor * NORMAL_95 * prediction.std[:, i]
         style = {"color": _PREDICTED, "alpha": 0.25, "lw": 0, "label": "95 % interval of the prediction"}
         panel.fill_between(prediction.time_s, predicted - width, predicted + width, **style)
         # while the initial state is not known the prediction is no statement
@@ -78,15 +77,17 @@ def _panel(panel: Any, run: ComparedRun, name: str) -> None:
     fit = prediction.fit_percent().get(name)
     if fit is not None:
         panel.set_title(f"fit {fit:.1f} %", fontsize=8)
-    panel.set_ylabel(f"{_NAMES[name]}, {unit}", fontsize=8)
+    panel.set_ylabel(f"{MOTION[name].words}, {unit}", fontsize=8)
     panel.tick_params(labelsize=7)
     panel.grid(lw=0.3)
 
 
 def _strip(strip: Any, run: ComparedRun, name: str) -> None:
     """Draw measured less predicted, with its interval where the model gives one."""
-    prediction, i = run.predicted, CHANNELS.index(name)
-    error, width = (UNITS[name][1] * column for column in (prediction.error[:, i], WIDTH_95 * prediction.std[:, i]))
+    prediction, i = run.predicted, MEASUREMENTS.index(name)
+    error, width = (
+        MOTION[name].shown[1] * column for column in (prediction.error[:, i], NORMAL_95 * prediction.std[:, i])
+    )
     if np.isfinite(width).any():
         strip.fill_between(prediction.time_s, -width, width, color=_PREDICTED, alpha=0.25, lw=0)
     strip.plot(prediction.time_s, error, color="black", lw=0.7)

@@ -13,11 +13,11 @@ from kempf.flows.jobs.standing_model import Own, standing
 from kempf.flows.jobs.stored_diagnosis import diagnosed_with_evidence
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter
+from kempf.schemas.instants import iso_utc, minute
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, examinations, vessels
 from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.report.content import ReportContent, ShownManoeuvre
@@ -114,7 +114,7 @@ def content_of(
     shown = []
     for number, manoeuvre in enumerate(evidence.manoeuvres, start=1):
         segment = segments[manoeuvre.segment_id]
-        start = iso_utc(manoeuvre.start_utc_ns)[:16].replace("T", " ")
+        start = minute(iso_utc(manoeuvre.start_utc_ns))
         shown.append(
             ShownManoeuvre(
                 number=number,

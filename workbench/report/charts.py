@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import Float
 from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.charts.bins import Shown
 from kempf.workbench.charts.channels import LATERAL, derived, entry
 from kempf.workbench.charts.frames import encoded

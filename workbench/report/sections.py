@@ -8,6 +8,8 @@ from typing import Any
 
 from kempf.schemas.diagnosis_evidence import FittedParameter
 from kempf.schemas.enumeration import as_words
+from kempf.schemas.instants import second
+from kempf.schemas.motion_channel import MOTION
 from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.figures import (
     diagnosis_added_variable,
@@ -36,7 +38,7 @@ from kempf.workbench.report.content import (
     TextBlock,
 )
 
-_CHANNELS = {"heading": "heading", "yaw_rate": "yaw rate", "lateral_speed": "lateral speed"}
+_CHANNELS = ("heading", "yaw_rate", "lateral_speed")
 
 
 def _picture(figure: Any, alt: str, caption: str) -> PictureBlock:
@@ -175,7 +177,7 @@ def _fit_table(content: ReportContent) -> TableBlock:
     every = [fits for manoeuvre in content.manoeuvres for fits in manoeuvre.evidence.before.fit_percent.values()]
     channels = [name for name in _CHANNELS if any(name in fits for fits in every)]
     head = ["manoeuvre", "sample", "horizon"]
-    head += [f"{_CHANNELS[name]}, {model}" for name in channels for model in _models(content)]
+    head += [f"{MOTION[name].words}, {model}" for name in channels for model in _models(content)]
     rows: list[list[Cell]] = []
     for manoeuvre in _held_out_first(content):
         predicted = [each for each in (manoeuvre.evidence.before, manoeuvre.evidence.after) if each is not None]
@@ -253,15 +255,11 @@ def _worst(content: ReportContent) -> TableBlock:
                 (
                     *(names[window["run"]], SampleBadge(held), window["measure"]),
                     *(as_words(window["channel"]), as_words(window["phase"] or "")),
-                    *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", _clock(window["start"]), size),
+                    *(f"{window['start_s']:.0f} to {window['end_s']:.0f}", second(window["start"]), size),
                 )
             )
     head = ("manoeuvre", "sample", "horizon", "channel", "phase", "time, s", "begins, UTC", "rms error")
     return TableBlock("The windows with the largest errors, to look at in the logs", head, rows)
-
-
-def _clock(iso: str) -> str:
-    return iso[:19].replace("T", " ")
 
 
 def correlations(content: ReportContent) -> list[Block]:

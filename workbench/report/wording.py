@@ -12,7 +12,7 @@ from shlex import quote
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
-from kempf.schemas.enumeration import as_words, listed
+from kempf.schemas.enumeration import as_words, counted, listed
 
 #: the verdicts that claim an effect
 CLAIMING = ("explained", "ambiguous", "partly_explained")
@@ -224,7 +224,7 @@ def _sections(verdict: str, evidence: DiagnosisEvidence, diagnosed: str, first: 
         ),
         "correlations": SectionWords(
             "Correlations of the one-step errors",
-            f"Over the {fitted} fitted manoeuvre{'s' * (fitted != 1)}. If a model is right, its innovations are "
+            f"Over the {counted(fitted, 'fitted manoeuvre')}. If a model is right, its innovations are "
             "uncorrelated with their past and with rudder, heading, speed and wind: 99 of 100 values lie in the grey "
             "band, 2.58 / √N.",
         ),

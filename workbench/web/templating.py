@@ -9,6 +9,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kempf.schemas.enumeration import as_words, at_the_beginning
+from kempf.schemas.instants import minute, second
 from kempf.workbench.documents.tried import refits
 from kempf.workbench.effect_verdicts import effect_verdict
 from kempf.workbench.numbers import number, percent
@@ -34,7 +35,8 @@ def _templates() -> Environment:
     )
     filters: dict[str, Callable[..., Any]] = {
         "number": number,
-        "minute": lambda iso: iso[:16].replace("T", " "),
+        "minute": minute,
+        "second": second,
         "words": as_words,
         "error": in_words,
         "sized": sized,

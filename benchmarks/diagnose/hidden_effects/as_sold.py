@@ -13,7 +13,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.simulate.instruments import SECOND_NS, InstrumentRecord
+from kempf.pipeline.simulate.instruments import InstrumentRecord
+from kempf.schemas.units import SECOND_NS
 
 Float = NDArray[np.float64]
 

@@ -13,16 +13,11 @@ from benchmarks.diagnose.hidden_effects.as_sold import as_sold
 from benchmarks.diagnose.hidden_effects.programme import QUICK_SHIP_S
 from benchmarks.diagnose.hidden_effects.sail import Voyage
 from kempf.pipeline.simulate.hulls import SimulatedHull
-from kempf.pipeline.simulate.instruments import (
-    DEFAULT_INSTRUMENTS,
-    SECOND_NS,
-    Instrument,
-    InstrumentRecord,
-    measure,
-)
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument, InstrumentRecord, measure
 from kempf.pipeline.simulate.sensors import Setting
 from kempf.pipeline.simulate.trajectory import Sample, Trajectory
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, Truth
+from kempf.schemas.units import SECOND_NS
 
 Float = NDArray[np.float64]
 

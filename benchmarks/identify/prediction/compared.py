@@ -10,7 +10,7 @@ import numpy as np
 from kempf.flows.jobs.checked_prediction import CheckedPredictions
 from kempf.flows.jobs.predict_request import PredictRequest
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.manoeuvre.prediction import Figure
+from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.store import Warehouse
@@ -119,7 +119,7 @@ def predicted_beside(
     return tuple(found), tuple(refused), models
 
 
-def _beside(manoeuvre: str, truth: Mapping[str, float], figures: Mapping[str, Figure]) -> Iterator[Compared]:
+def _beside(manoeuvre: str, truth: Mapping[str, float], figures: Mapping[str, PredictedFigure]) -> Iterator[Compared]:
     for name, true in truth.items():
         one = figures[name]
         if one.value is not None and one.low is not None and one.high is not None:

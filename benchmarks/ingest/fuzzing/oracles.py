@@ -17,11 +17,11 @@ from time import perf_counter, process_time
 from benchmarks.ingest.fuzzing.corpus import PROFILE, Reader, inputs
 from benchmarks.ingest.fuzzing.whole_chunks import vouched_times
 from kempf.flows.jobs.files import read_profiles
-from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings
 from kempf.schemas.channels import CHANNEL_COLUMNS
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
+from tests.reading import read_log
 
 #: What came of one input, in few words: equal words mean that the reader did the same.
 Outcome = tuple[str, ...]

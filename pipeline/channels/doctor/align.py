@@ -11,7 +11,8 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Lag that is looked for on either side, s.
 LONGEST_S = 60.0

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from kempf.pipeline.channels.doctor.align import Alignment
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome, untestable, worst
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: Over a whole log two clocks may drift apart by so much, s: less is no gross fault.
 _DRIFT_S = 1.0
@@ -21,7 +22,7 @@ _SHORT_S = 3.0
 
 def clock_figures(
     alignment: Alignment, lags_s: tuple[float, float], over: Series, own_s: float = 0.0
-) -> tuple[Figure, Figure]:
+) -> tuple[CheckFigure, CheckFigure]:
     """Return the lag and its growth with what sound clocks give.
 
     Parameters
@@ -37,8 +38,8 @@ def clock_figures(
     # one kind of manoeuvre at the beginning and another at the end look like twice as much over the whole
     drift = (_DRIFT_S + 2.0 * own_s) / max(span, 1.0)
     return (
-        Figure("lag", alignment.lag_s, alignment.lag_std_s, *lags_s, "s"),
-        Figure("growth of the lag", alignment.rate, alignment.rate_std, -drift, drift, "s/s"),
+        CheckFigure("lag", alignment.lag_s, alignment.lag_std_s, *lags_s, "s"),
+        CheckFigure("growth of the lag", alignment.rate, alignment.rate_std, -drift, drift, "s/s"),
     )
 
 
@@ -46,7 +47,7 @@ def clock_outcome(
     name: str,
     sides: tuple[tuple[str, ...], tuple[str, ...]],
     alignment: Alignment,
-    figures: tuple[Figure, Figure],
+    figures: tuple[CheckFigure, CheckFigure],
     also: tuple[Fault, ...] = (),
 ) -> Outcome:
     """Judge two clocks by the lag of the second side behind the first and its growth.
@@ -59,7 +60,7 @@ def clock_outcome(
         Channels of the first and of the second instrument.
     alignment : Alignment
         Of their motions.
-    figures : (Figure, Figure)
+    figures : (CheckFigure, CheckFigure)
         From `clock_figures`.
     also : tuple of Fault, optional
         What looks like a lag and is none.

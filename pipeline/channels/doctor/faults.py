@@ -10,7 +10,8 @@ from typing import Literal
 import numpy as np
 
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 Kind = Literal["sign", "unit", "scale", "frame", "axes", "swap", "offset", "latency", "clock_scale", "stuck", "leap"]
 

@@ -13,7 +13,7 @@ from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import AXES, BOW_AND_COURSE, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
 from kempf.pipeline.channels.doctor.motion import moves, stream_std
-from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Series
 
@@ -76,7 +76,7 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     slope, own_std = (both.whole, both.whole_std) if steady else (both.slope, both.slope_std)
     std = float(np.hypot(own_std, 0.5 * stream_std(log, speed) / speed))
     low, high = _BODY_SLOPES if kind == "body" else SLOPES
-    figure = Figure("change of direction of the velocity over change of heading", slope, std, low, high)
+    figure = CheckFigure("change of direction of the velocity over change of heading", slope, std, low, high)
     words = f"the {_WORDS[kind]} changes by {slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
     state = figure.state
     if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:

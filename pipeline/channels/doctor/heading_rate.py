@@ -9,10 +9,11 @@ from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import BOW_AND_COURSE, UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move
-from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
 SLOPES = (0.8, 1.25)
@@ -95,7 +96,7 @@ def _turning(alignment: Alignment, span_s: float, *, another: bool) -> Outcome:
         if alignment.turned < _STEADY_TURN:
             return untestable("heading_rate", _CHANNELS, "the two motions are not correlated")
         slope, std = alignment.whole, float(np.hypot(alignment.whole_std, _BIAS_RAD_S * span_s / alignment.turned))
-    figure = Figure("integrated yaw rate over change of heading", slope, std, *SLOPES)
+    figure = CheckFigure("integrated yaw rate over change of heading", slope, std, *SLOPES)
     words = f"the integrated yaw rate is {slope:.3g} ± {std:.2g} (1 s.e.) times the change of heading"
     suspects = [
         Fault("sign", ("yaw_rate",)),

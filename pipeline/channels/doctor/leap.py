@@ -7,10 +7,12 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series, written
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.instants import written
+from kempf.schemas.units import SECOND_NS
 
 #: The heading of so many readings, and of so long, s, is compared with that of as many before.
 _READINGS, _LEAST_S = 3, 2.5
@@ -39,7 +41,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading = log.series["heading"]
     if _in_radians(heading.value):
         words = "the heading runs from 0 to 6.28 deg and begins again"
-        figure = Figure(
+        figure = CheckFigure(
             "leap of the heading",
             float(np.rad2deg(np.max(np.abs(np.diff(heading.value))))),
             0.01,
@@ -58,7 +60,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     k = int(np.argmax(sizes))
     usual = quantile(sizes[np.isfinite(leaps)], _MOSTLY)
     allowed = max(_LEAST_DEG, _TIMES * float(np.rad2deg(usual)))
-    figure = Figure("leap of the heading", float(np.rad2deg(sizes[k])), 0.1, 0.0, allowed, "deg")
+    figure = CheckFigure("leap of the heading", float(np.rad2deg(sizes[k])), 0.1, 0.0, allowed, "deg")
     if figure.state != "disagree":
         words = "the heading does not leap while the ship is steady"
         return [Outcome("heading_leap", _CHANNELS, "agree", words, (figure,), alone=True)]

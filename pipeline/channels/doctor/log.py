@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 Complex = NDArray[np.complex128]
 

@@ -11,10 +11,12 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
 from kempf.pipeline.channels.doctor.motion import may_drift, moves, stream_std
-from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Leeway of a ship under way, one standard deviation, rad, and the deviation of a compass that is no gross fault.
 _LEEWAY_RAD, _DEVIATION_DEG = float(np.deg2rad(2.0)), 5.0
@@ -65,7 +67,9 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
         return untestable(name, channels, "too few readings under way" if way is None else way.why_not)
     angle, std = way.angle, float(np.hypot(way.own_std, _LEEWAY_RAD))
     quantity = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
-    figure = Figure(quantity, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
+    figure = CheckFigure(
+        quantity, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg"
+    )
     words = f"{quantity} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
     if figure.state == "disagree" and not _repeated(log, kind, heading, velocity, angle):
         return untestable(name, channels, f"{words}, but not in every stretch of the log")
@@ -149,7 +153,7 @@ def _repeated(log: Log, kind: str, heading: Series, velocity: Velocity, angle: f
 
 def _varies(speed: Float) -> float:
     """Return the standard deviation of speeds, from their median size beside the median, m/s."""
-    return 1.4826 * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
+    return MAD_TO_STD * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
 
 
 def _columns(bow: Float, rate: Float) -> Float:

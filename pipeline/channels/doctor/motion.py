@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.doctor.log import SLOWEST_M_S, Complex, Log, Velocity
 from kempf.pipeline.channels.doctor.robust_regression import quantile
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Components of a stream that is not known, one standard deviation: four of these are faster than any that ships are
 #: tried in, and half of what the ship makes herself - in a faster one nobody tests her.

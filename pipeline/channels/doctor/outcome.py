@@ -19,7 +19,7 @@ STILL = "she does not move: not testable"
 
 
 @dataclass(frozen=True)
-class Figure:
+class CheckFigure:
     """One measured figure of a check and what is expected of it."""
 
     name: str
@@ -64,7 +64,7 @@ class Outcome:
     state: State
     #: One sentence with the evidence.
     words: str
-    figures: tuple[Figure, ...] = ()
+    figures: tuple[CheckFigure, ...] = ()
     #: Size of what does not go together over the size of what there is; shows which of two corrections fits better.
     left_over: float = 0.0
     #: What could have caused a disagreement.

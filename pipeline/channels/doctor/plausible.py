@@ -14,7 +14,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log, integral
 from kempf.pipeline.channels.doctor.motion import may_drift, speed_of, stream_std, under_way
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, State, worst
+from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome, State, worst
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Float
 from kempf.schemas.channels import CHANNELS
@@ -88,11 +88,11 @@ def _ranges(log: Log) -> Iterator[Outcome]:
         if refused >= _FEWEST:
             share = refused / (refused + kept)
             std = float(np.sqrt(max(share * (1.0 - share), 1e-12) / (refused + kept)))
-            figures.append(Figure("share of the values outside the channel's range", share, std, 0.0, _DAMAGED))
+            figures.append(CheckFigure("share of the values outside the channel's range", share, std, 0.0, _DAMAGED))
             words.append(f"{refused} of {refused + kept} values lie outside its range{_limits(name)} and were refused")
         if series is not None and channel is not None and name in _REACH and kept >= _FEWEST:
             fast = quantile(np.abs(series.value), _MOSTLY)
-            figures.append(Figure("size of the values", fast, 0.0, 0.0, _REACH[name], channel.unit))
+            figures.append(CheckFigure("size of the values", fast, 0.0, 0.0, _REACH[name], channel.unit))
             words.append(f"one in fifty values is beyond {_shown(fast, channel.unit)}")
         if any(figure.state == "disagree" for figure in figures):
             text = "; ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
@@ -118,14 +118,15 @@ def _size_and_speed(log: Log) -> list[Outcome]:
     speeds = dict(_fast_speeds(log))
     if not speeds:
         return []
-    figures: list[Figure] = []
+    figures: list[CheckFigure] = []
     ratios: dict[str, float] = {}
     typical = float(np.median(list(speeds.values())))
     trial, length = log.trial_speed_m_s, log.length_m
     if trial is not None:
         std = stream_std(log, trial) / trial
         figures += [
-            Figure(f"{name} over trial speed", speed / trial, std, 0.0, _OF_TRIAL) for name, speed in speeds.items()
+            CheckFigure(f"{name} over trial speed", speed / trial, std, 0.0, _OF_TRIAL)
+            for name, speed in speeds.items()
         ]
         ratios["speed"] = typical / trial
     if length is not None:
@@ -168,7 +169,7 @@ def _fast_speeds(log: Log) -> Iterator[tuple[str, float]]:
             yield name, quantile(np.abs(velocity.value), _MOSTLY)
 
 
-def _turning(log: Log, length: float, ratios: dict[str, float]) -> Iterator[Figure]:
+def _turning(log: Log, length: float, ratios: dict[str, float]) -> Iterator[CheckFigure]:
     """Yield the figures of the rate of turn while she is under way."""
     rate, speed, rudder = log.series.get("yaw_rate"), speed_of(log), log.series.get("rudder_angle")
     if rate is None or speed is None or may_drift(log, quantile(speed.value, _MOSTLY)):
@@ -187,8 +188,8 @@ def _turning(log: Log, length: float, ratios: dict[str, float]) -> Iterator[Figu
         yield _figure("the same over the rudder angle", ratios["rudder"], _TURN_OF_RUDDER)
 
 
-def _figure(name: str, value: float, band: tuple[float, float]) -> Figure:
-    return Figure(name, value, _SHARE * value, *band)
+def _figure(name: str, value: float, band: tuple[float, float]) -> CheckFigure:
+    return CheckFigure(name, value, _SHARE * value, *band)
 
 
 def _of_whom(log: Log) -> str:

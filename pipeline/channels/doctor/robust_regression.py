@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
 from kempf.pipeline.channels.series import Float
 
 #: Huber's limit in robust standard deviations: 95 % as efficient as least squares on Gaussian noise.
@@ -89,7 +90,7 @@ def fit(columns: Float, observed: Float) -> RobustLine | None:
 
 def _spread(residual: Float) -> float:
     """Return the standard deviation of Gaussian residuals, from their median size."""
-    return 1.4826 * quantile(np.abs(residual), 0.5)
+    return MAD_TO_STD * quantile(np.abs(residual), 0.5)
 
 
 def _summed_products(score: Float, lags: int) -> Float:

@@ -6,10 +6,10 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import fit, reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 _CHANNELS = ("rudder_order", "rudder_angle")
 _SLOPES, _OFFSETS_DEG = (0.7, 1.4), (-5.0, 5.0)
@@ -56,15 +56,15 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     # the rudder on its way between two orders is neither lag nor fault
     slope_std = float(np.hypot(line.std[0], 0.05 * abs(slope)))
     figures = (
-        Figure("rudder angle over rudder order", slope, slope_std, *_SLOPES),
-        Figure(
+        CheckFigure("rudder angle over rudder order", slope, slope_std, *_SLOPES),
+        CheckFigure(
             "rudder angle at zero order",
             np.rad2deg(offset),
             np.rad2deg(line.std[1]) + 0.5,
             *_OFFSETS_DEG,
             "deg",
         ),
-        Figure("lag of the rudder angle behind the order", best[1], 0.5, *_LAGS_S, "s"),
+        CheckFigure("lag of the rudder angle behind the order", best[1], 0.5, *_LAGS_S, "s"),
     )
     words = (
         f"the rudder angle is {slope:.2f} ± {slope_std:.1g} (1 s.e.) times the order {figures[1].value:+.1f} deg and "

@@ -15,10 +15,11 @@ from kempf.pipeline.channels.doctor.align import edges_of
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral, turning
 from kempf.pipeline.channels.doctor.motion import does_not_move, speed_of, under_way
-from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit, quantile, reach
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: A rudder that moves less than this shows nothing, rad; one that moves less than the second while the ship swings so
 #: many times farther is in another unit.
@@ -156,7 +157,7 @@ def _faint(name: str, channels: tuple[str, ...], answered: _Answer, moved: float
     """Judge a rudder that hardly moves where she turns far: it is in another unit if she answers it all the same."""
     if answered.explains < _CLOCKED or abs(answered.fit.value[0]) < SURE * answered.fit.std[0]:
         return untestable(name, channels, "the rudder was hardly used, or the ship hardly turned")
-    figure = Figure(
+    figure = CheckFigure(
         "rudder angle range", np.rad2deg(moved), 0.1 * np.rad2deg(moved), np.rad2deg(_FAINT_RUDDER), 180.0, "deg"
     )
     words = f"the rudder moves by {figure.value:.2g} deg only, while she turns through {np.rad2deg(swung):.0f} deg"
@@ -316,7 +317,7 @@ def _clock(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
     line, shift = answered.fit, answered.shift_s
     if answered.explains < _CLOCKED or abs(line.value[0]) < SURE * line.std[0]:
         return untestable(name, channels, "the yaw response is too weak to determine the rudder's delay")
-    figure = Figure("delay of the rudder channel behind the yaw response", shift, _SHIFT_STD_S, *USUAL_S, "s")
+    figure = CheckFigure("delay of the rudder channel behind the yaw response", shift, _SHIFT_STD_S, *USUAL_S, "s")
     when = "earlier" if shift > 0 else "later"
     words = f"the yaw response fits best with the rudder put over {abs(shift):.0f} s {when} than logged"
     if figure.state == "disagree" and not _same_shift(answered):
@@ -345,8 +346,8 @@ def _judged(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
     neutral = -float(line.value[2]) / answer
     neutral_std = float(np.hypot(line.std[2] / abs(answer), np.deg2rad(_NEUTRAL_STD_DEG)))
     figures = (
-        Figure("yaw acceleration per rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
-        Figure(
+        CheckFigure("yaw acceleration per rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
+        CheckFigure(
             "neutral rudder angle",
             np.rad2deg(neutral),
             np.rad2deg(neutral_std),

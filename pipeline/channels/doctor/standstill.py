@@ -9,9 +9,10 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move, stream_std
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.schemas.units import SECOND_NS
 
 #: A channel stands still when it repeats itself so long, in so many readings, while the ship turns so far.
 _LEAST_S, _LEAST_READINGS, _TURN_DEG = 10.0, 10, 5.0
@@ -70,7 +71,7 @@ def _judged(channel: str, reference: str, standstill: tuple[Series, float] | Non
     if standstill is None and in_all < 2.0 * _TURN_RAD:
         return untestable(name, channels, "the ship hardly turned")
     turned = 0.0 if standstill is None else standstill[1]
-    figure = Figure("turn while the channel is constant", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
+    figure = CheckFigure("turn while the channel is constant", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
     if standstill is None:
         # that a reading moves says nothing of its zero or its sense
         words = f"{channel} is never constant while the ship turns"
@@ -104,7 +105,7 @@ def _of_water_speed(log: Log) -> list[Outcome]:
     return [Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))]
 
 
-def _missed(log: Log, still: Series, ground: Series) -> tuple[Figure, str] | None:
+def _missed(log: Log, still: Series, ground: Series) -> tuple[CheckFigure, str] | None:
     """Return what the speed over ground does beyond a stream while a log repeats itself, and that in words."""
     start, end = int(still.time_utc_ns[0]), int(still.time_utc_ns[-1])
     speed = _means(ground.between(start, end))
@@ -113,7 +114,7 @@ def _missed(log: Log, still: Series, ground: Series) -> tuple[Figure, str] | Non
     usual = float(np.median(speed))
     stream = _STREAMS * stream_std(log, quantile(np.abs(ground.value), 0.9))
     if abs(float(still.value[0])) < _NOTHING * usual:
-        figure = Figure(
+        figure = CheckFigure(
             "speed over ground while the log shows none", usual, _CHANGE_STD * usual, 0.0, 2.0 * stream, "m/s"
         )
         return figure, f"the speed over ground is {usual:.3g} m/s"
@@ -123,11 +124,11 @@ def _missed(log: Log, still: Series, ground: Series) -> tuple[Figure, str] | Non
     rounding = float(np.min(steps[steps > 0.0], initial=usual))
     if rounding < _FINE * usual and heading.size:
         # a turn costs speed, and no log that shows a thousandth of it misses that
-        turn = Figure("turn while the log is constant", float(np.rad2deg(swing)), 1.0, 0.0, _LOG_TURN_DEG, "deg")
+        turn = CheckFigure("turn while the log is constant", float(np.rad2deg(swing)), 1.0, 0.0, _LOG_TURN_DEG, "deg")
         return turn, f"the ship turns by {turn.value:.0f} deg"
     allowed = rounding + _CHANGE * usual + stream * min(swing, 2.0)
     change = float(np.ptp(speed))
-    figure = Figure(
+    figure = CheckFigure(
         "change of speed over ground while the log is constant", change, _CHANGE_STD * usual, 0.0, allowed, "m/s"
     )
     return figure, f"the speed over ground changes by {change:.3g} m/s"

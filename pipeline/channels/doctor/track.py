@@ -9,9 +9,11 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import AXES, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noise
 from kempf.pipeline.channels.doctor.motion import does_not_move
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import fit, quantile
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: Ratios of the two ways that are no fault, and angles between them, deg.
 RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)
@@ -125,11 +127,11 @@ def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: 
 def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
     """Judge the logarithms of the ratios of the way by the velocity to the way by the fixes, shape (n,)."""
     middle = quantile(ratios, 0.5)
-    spread = 1.4826 * quantile(np.abs(ratios - middle), 0.5)
+    spread = MAD_TO_STD * quantile(np.abs(ratios - middle), 0.5)
     ratio = float(np.exp(middle))
     # the windows overlap: a quarter of them is independent
     std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
-    figure = Figure("integrated speed over distance between fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
+    figure = CheckFigure("integrated speed over distance between fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
     quantity = "velocity" if len(speed) > 1 else speed[0].replace("_", " ")
     words = f"integrated {quantity} is {ratio:.3g} ± {std:.1g} (1 s.e.) times the distance between fixes"
     suspects = [
@@ -154,17 +156,17 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, ...], 
     # the circular variance
     astray = 1.0 - abs(mean)
     off = np.angle(unit * np.exp(-1j * angle))
-    own = 1.4826 * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
+    own = MAD_TO_STD * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
     std = float(np.hypot(own, one_sided))
     figures = (
-        Figure(
+        CheckFigure(
             "bearing between fixes minus direction of the velocity",
             np.rad2deg(angle),
             max(np.rad2deg(std), 0.1),
             *_ANGLES_DEG,
             "deg",
         ),
-        Figure("circular variance of that difference", astray, 0.02, 0.0, _ASTRAY),
+        CheckFigure("circular variance of that difference", astray, 0.02, 0.0, _ASTRAY),
     )
     words = (
         f"bearing between fixes minus direction of the velocity is {figures[0].value:+.1f} ± {figures[0].std:.1g} deg "
@@ -208,7 +210,7 @@ def _across(channels: tuple[str, ...], ways: tuple[Complex, ...]) -> Outcome:
     if line is None:
         return untestable("across_body", channels, "position constant, or speed zero")
     slope, std = float(line.value[0]), float(line.std[0])
-    figure = Figure("way across the bow by the fixes over that by the velocity", slope, std, *_ACROSS)
+    figure = CheckFigure("way across the bow by the fixes over that by the velocity", slope, std, *_ACROSS)
     words = f"the fixes show {slope:.2f} ± {std:.2g} (1 s.e.) times the drift of the velocity across the bow"
     suspects = (
         Fault("sign", VELOCITIES["body"][1:]),

@@ -9,7 +9,7 @@ from typing import Any
 from kempf.pipeline.channels.doctor.corrections import propose
 from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome
+from kempf.pipeline.channels.doctor.outcome import CheckFigure, Outcome
 from kempf.schemas.enumeration import listed
 from kempf.schemas.profile import ChannelMap
 
@@ -77,7 +77,7 @@ def _outcome(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _figure(figure: Figure) -> dict[str, Any]:
+def _figure(figure: CheckFigure) -> dict[str, Any]:
     return {
         "name": figure.name,
         "value": float(figure.value),

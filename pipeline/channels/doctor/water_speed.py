@@ -7,7 +7,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity
 from kempf.pipeline.channels.doctor.motion import STREAM_STD_M_S, makes_way, moves
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, CheckFigure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Float, Series
@@ -63,7 +63,7 @@ def _compare(log: Log, kind: str, water: Series, velocity: Velocity) -> Outcome:
     slope = float(fitted.value[0])
     ratio = 1.0 / slope
     std = abs(ratio) * float(np.hypot(fitted.std[0] / slope, _ZERO_M_S / speed))
-    figure = Figure("speed through the water over speed over ground, current removed", ratio, std, *_RATIOS)
+    figure = CheckFigure("speed through the water over speed over ground, current removed", ratio, std, *_RATIOS)
     words = f"speed through the water is {ratio:.2f} ± {std:.2g} (1 s.e.) times the speed over ground, current removed"
     suspects = [
         Fault("sign", ("speed_through_water",)),

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from kempf.pipeline.channels.grid import make_grid
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 _MIN_WHOLE = 60
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 #: a run farther away in time is of another day: the stream, the load and the engine are others
 _SAME_DAY_S = 12 * 3600.0

@@ -26,12 +26,12 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.no_log.joint_motion import LateralFit, Priors, coarsened, run_of
+from kempf.pipeline.estimate.no_log.lateral_steps import SlowForces
 from kempf.pipeline.estimate.no_log.speed import Motion, Speed, speed_without_log
 from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate, hull_values
-from kempf.pipeline.model.lateral_steps import SlowForces
 from kempf.pipeline.model.ship import Hull
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.model_spec import ModelSpec

@@ -19,10 +19,8 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.smoother import LinearSystem
-from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.model.chain import N_CHAIN
-from kempf.pipeline.model.lateral_steps import HEADING, SWAY, YAW, SlowForces, lateral_steps
-from kempf.pipeline.model.longitudinal import (
+from kempf.pipeline.estimate.no_log.lateral_steps import HEADING, SWAY, YAW, SlowForces, lateral_steps
+from kempf.pipeline.estimate.no_log.longitudinal import (
     LOSS,
     N_LONGITUDINAL,
     PATH,
@@ -31,6 +29,8 @@ from kempf.pipeline.model.longitudinal import (
     Surge,
     discretise_surge,
 )
+from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.model.chain import N_CHAIN
 from kempf.pipeline.model.ship import Hull
 
 BIAS = N_CHAIN

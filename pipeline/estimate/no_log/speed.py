@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize
 
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, smooth
 from kempf.pipeline.estimate.no_log.joint_motion import (
@@ -28,8 +29,8 @@ from kempf.pipeline.estimate.no_log.joint_motion import (
     set_surge,
     spans,
 )
-from kempf.pipeline.model.lateral_steps import YAW
-from kempf.pipeline.model.longitudinal import Surge
+from kempf.pipeline.estimate.no_log.lateral_steps import YAW
+from kempf.pipeline.estimate.no_log.longitudinal import Surge
 
 #: bounds of T in s, of the wander of V over its mean in 1/s^0.5, of the noise of y_u in m/s
 _T_S, _WANDER, _NOISE_M_S = (2.0, 3000.0), (1e-5, 0.03), (1e-4, 2.0)
@@ -223,7 +224,7 @@ def _root(variance: Float) -> Float:
 
 def _gated(runs: tuple[MotionRun, ...], white: Float, rows: tuple[slice, ...]) -> tuple[MotionRun, ...]:
     """Leave out y_u whose innovation lies beyond the gate, in robust standard deviations."""
-    width = _GATE * 1.4826 * float(np.nanmedian(np.abs(white)))
+    width = _GATE * MAD_TO_STD * float(np.nanmedian(np.abs(white)))
     kept = []
     for run, span in zip(runs, rows, strict=True):
         along = run.along_m_s.copy()

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.kalman_filter import Filtered, run_filter
 from kempf.pipeline.estimate.paper.least_squares import Regression, regress
-from kempf.pipeline.model.vehicle import LinearVehicle
+from kempf.pipeline.estimate.paper.vehicle import LinearVehicle
 from kempf.schemas.errors import DataRejected
 
 End = Literal["converged", "cycling", "diverged", "still moving"]

@@ -9,11 +9,11 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.paper.least_squares import estimate_from_discrete
 from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedurePass, ProcedureSettings, iterate
+from kempf.pipeline.estimate.paper.vehicle import LinearVehicle, SlowDisturbance
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.model.ship import Hull, continuous_from_discrete
-from kempf.pipeline.model.vehicle import LinearVehicle, SlowDisturbance
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 
 #: What the paper reports after 25 iterations: errors in percent of the true values.

@@ -13,6 +13,7 @@ from kempf.pipeline.channels.lateral_speed import LateralSpeed, noise_std
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.estimate.record.channel_faults import FARTHEST_RAD
 from kempf.pipeline.estimate.record.moves import moves, swing
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
 
 #: executes that a record must hold: the first turns her one way, the second shows how she comes back
@@ -71,7 +72,7 @@ def check_manoeuvre(rudder: Series, heading: Series) -> tuple[str, ...]:
     if executes < _EXECUTES:
         raise DataRejected(
             "too_few_executes",
-            f"The rudder is put over {executes} time{'' if executes == 1 else 's'} in this segment, identification "
+            f"The rudder is put over {counted(executes, 'time')} in this segment, identification "
             f"needs {_EXECUTES}: one turn alone does not distinguish damping from rudder force.",
             "Sail a zigzag of at least two legs, or take a longer part of the log.",
             {"executes": executes, "needed": _EXECUTES},

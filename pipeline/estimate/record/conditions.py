@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.heel import rolling
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
+from kempf.schemas.units import SECOND_NS
 
 #: part of the manoeuvre that a channel must cover
 _COVERED = 0.9

@@ -12,11 +12,11 @@ from kempf.pipeline.channels.gear_runs import with_straight_runs
 from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
-from kempf.pipeline.channels.punctual import Punctual, VelocitySlope, punctual
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.channels.there_and_back import counted
+from kempf.pipeline.channels.undelayed_speeds import UndelayedSpeeds, VelocitySlope, undelayed_speeds
 from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
 from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way
 from kempf.pipeline.estimate.record.jumps import find_jumps
@@ -25,6 +25,7 @@ from kempf.pipeline.estimate.record.speed_error import SpeedError, rudder_of_spe
 from kempf.pipeline.estimate.record.speed_readings import SpeedReadings
 from kempf.pipeline.estimate.record.water_speed import water_speed
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 _MIN_INSTANTS = 40
 #: time beyond the segment over which the log is taken at least, s, and how many means that share no reading are enough
@@ -53,7 +54,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         A channel is missing, not finite, has a gap that cannot be bridged, stands still or contradicts another; the
         rudder or the ship did not move; `docs/bad_input.md` has every code.
     """
-    as_delivered, on_time = instruments, punctual(instruments, start_utc_ns, end_utc_ns)
+    as_delivered, on_time = instruments, undelayed_speeds(instruments, start_utc_ns, end_utc_ns)
     instruments = on_time.instruments
     warnings: list[str] = [*on_time.said, *_left_out(as_delivered, start_utc_ns, end_utc_ns)]
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
@@ -215,7 +216,9 @@ def _speed(slow: Series, instants: Nanoseconds) -> Float:
     return speed
 
 
-def _cut_log(on_time: Punctual, as_delivered: Instruments, start_ns: int, end_ns: int) -> tuple[Series | None, float]:
+def _cut_log(
+    on_time: UndelayedSpeeds, as_delivered: Instruments, start_ns: int, end_ns: int
+) -> tuple[Series | None, float]:
     """Return the speed log about the segment, None where it has too little; and what its values are means over, s."""
     name, margin = "speed_through_water", round(_BEYOND_S * SECOND_NS)
     delivered = _cut(as_delivered, name, start_ns - margin, end_ns + margin)

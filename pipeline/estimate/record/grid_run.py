@@ -11,7 +11,7 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import cell_means, instants_of, readings_averaged, step_of
@@ -24,10 +24,11 @@ from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
+from kempf.schemas.units import SECOND_NS
 
 _APPROACH_S = 5.0
 #: column of the shaft speed in `GridRun.inputs`
-_SHAFT = 2 + list(CHANNEL_SYMBOLS).index("n")
+SHAFT_COLUMN = 2 + list(CHANNEL_SYMBOLS).index("n")
 #: quantile of speed over shaft speed that is that of a settled ship: her straight courses are few in zigzags
 _SETTLED = 0.95
 
@@ -129,7 +130,7 @@ class GridRun:
         """Mean shaft speed, 1/s; None where it is not logged or the shaft does not turn ahead."""
         if "shaft_speed" not in self.channels or not self.approach_per_s > 0.0:
             return None
-        shaft = float(np.mean(self.inputs[::ROWS, _SHAFT]))
+        shaft = float(np.mean(self.inputs[::ROWS, SHAFT_COLUMN]))
         return shaft if shaft > 0.0 else None
 
     @property
@@ -304,7 +305,7 @@ def make_run(
         current_row=current_row(spec, coarse),
         heading_rad=coarse,
         approach_m_s=approach_speed(fine, inputs[:, 0]),
-        approach_per_s=float(np.median(inputs[first, _SHAFT])) or 1.0,
+        approach_per_s=float(np.median(inputs[first, SHAFT_COLUMN])) or 1.0,
         channels=have,
         ship=ship,
         day=day,
@@ -365,7 +366,7 @@ def with_common_slip(runs: Sequence[GridRun], kept_m: float | None = None) -> tu
 
 def common_slip(runs: Sequence[GridRun]) -> float | None:
     """Return the speed that a shaft speed of one revolution a second keeps, m; None where no run has both."""
-    turning = [(run.speed_m_s, run.inputs[::ROWS, _SHAFT]) for run in runs if "shaft_speed" in run.channels]
+    turning = [(run.speed_m_s, run.inputs[::ROWS, SHAFT_COLUMN]) for run in runs if "shaft_speed" in run.channels]
     ratios = [speed[n > 0.0] / n[n > 0.0] for speed, n in turning if np.any(n > 0.0)]
     kept = float(np.quantile(np.concatenate(ratios), _SETTLED)) if ratios else 0.0
     return kept if kept > 0.0 else None

@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.recursion import filtered
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
 from kempf.pipeline.estimate.record.water_speed import heading_rate
+from kempf.schemas.units import SECOND_NS
 
 #: natural periods of roll that are tried, s: a boat's to a large ship's, so close that a damped one is not missed
 _PERIODS_S = np.geomspace(0.5, 40.0, 25)

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, noise_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.robust_std import MAD_TO_STD
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: a change beyond so many robust standard deviations of the changes over such a time is a leap
 _LEAP = 6.0
@@ -128,7 +130,7 @@ class _Motion:
             return self._limits[readings]
         lag = min(readings, self.velocity.shape[0] // 2)
         change = np.abs(self.velocity[lag:] - self.velocity[:-lag])
-        spread = 1.4826 * np.median(change, axis=0)
+        spread = MAD_TO_STD * np.median(change, axis=0)
         self._limits[readings] = _LEAP * np.maximum(spread, np.sqrt(2.0) * self._noise)
         return self._limits[readings]
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.grid import make_grid
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
-from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.units import SECOND_NS
 
 _MIN_PAIRS = 30
 
@@ -42,10 +43,9 @@ def sample(record: Record, step_s: float | None) -> Sampled:
     DataRejected
         Fewer than 30 pairs of neighbouring instants hold every channel.
     """
-    names = ("lateral_speed", "yaw_rate", "heading")
     time_ns = np.round(record.time_s * SECOND_NS).astype(np.int64)
     series: dict[str, Series] = {"rudder": Series(time_ns, record.rudder_rad)}
-    for i, name in enumerate(names):
+    for i, name in enumerate(MEASUREMENTS):
         good = np.isfinite(record.measured[:, i])
         if good.any():
             series[name] = Series(time_ns[good], record.measured[good, i])

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.estimate.record.moves import moves
+from kempf.schemas.units import SECOND_NS
 
 #: the yaw rate is the heading's change over this share of a leg
 _SHARE = 0.1

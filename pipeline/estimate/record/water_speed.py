@@ -13,9 +13,10 @@ import numpy as np
 
 from kempf.pipeline.channels.means import curve_of_means, mean_about
 from kempf.pipeline.channels.recursion import filtered
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Mask, Nanoseconds, Series
 from kempf.pipeline.channels.signal import Signal, signal
 from kempf.pipeline.estimate.record.moves import moves
+from kempf.schemas.units import SECOND_NS
 
 #: times in which a ship wins her speed back that are tried, in legs of the manoeuvre
 _LEGS = (0.3, 1.0, 3.0)

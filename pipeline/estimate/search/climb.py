@@ -14,6 +14,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.search.scoring import DenseSteps
+from kempf.schemas.model_spec import N_HULL
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
 _NEAR = 5.0
@@ -32,7 +33,6 @@ _HOPE, _FIRST = 4.0, 3
 #: so many steps in a row that leave the likelihood where it ends and come to less than this share of their promise say
 #: that it is highest there: beyond it ships answer faster than any vessel does
 _AT_THE_END, _VAIN = 4, 0.02
-_HULL = 6
 
 
 #: the form that information and curvature have
@@ -159,7 +159,7 @@ def climb_by(
     if not np.isfinite(value):
         reason = "the start has no likelihood"
         return Search(theta, -np.inf, score, information, converged=False, reason=reason, passes=())
-    curvature, damping, scale = information, 1e-3, np.abs(theta[:_HULL])
+    curvature, damping, scale = information, 1e-3, np.abs(theta[:N_HULL])
     converged, reason = False, "the iterations allowed ran out"
     passes = [Pass(theta, value, np.nan, damping)]
     report(passes[0])
@@ -244,9 +244,9 @@ def _shortened(step: Float, theta: Float, scale: Float) -> Float:
 
     Far from the maximum the quadratic model sends the ship into regions where she answers absurdly fast.
     """
-    reach = np.maximum(np.abs(theta[:_HULL]), scale)
+    reach = np.maximum(np.abs(theta[:N_HULL]), scale)
     # a parameter that began at nothing and is still there has no scale to leave
-    large = np.max(np.abs(step[:_HULL]) / np.where(reach > 0.0, reach, np.inf))
+    large = np.max(np.abs(step[:N_HULL]) / np.where(reach > 0.0, reach, np.inf))
     shortened = step.copy()
-    shortened[:_HULL] *= min(1.0, 1.0 / float(large + 1e-300))
+    shortened[:N_HULL] *= min(1.0, 1.0 / float(large + 1e-300))
     return shortened

@@ -17,8 +17,8 @@ import numpy as np
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.search.block_arrow import Arrow, ArrowSteps
 from kempf.pipeline.estimate.search.climb import Pass, Search, climb_by, nobody
+from kempf.schemas.model_spec import N_HULL
 
-_HULL = 6
 #: share of itself by which a variance falls at most in a step far from the top: of several that are too large together
 #: the quadratic model says that each is nothing
 _SHARE = 1.0 - float(np.exp(-2.0))
@@ -82,7 +82,7 @@ class _InVariances:
         self._pool, self.active = pool, pool.active
         # a level that the data do not have stays the logarithm that it is
         self._levels: Mask = pool.logarithms & pool.active
-        self._effects: Mask = ~pool.logarithms & (np.arange(pool.logarithms.size) >= _HULL)
+        self._effects: Mask = ~pool.logarithms & (np.arange(pool.logarithms.size) >= N_HULL)
         self.logarithms: Mask = np.zeros_like(self._levels)
         self.low, self.high = self.variances(pool.low), self.variances(pool.high)
 

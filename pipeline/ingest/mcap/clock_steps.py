@@ -8,7 +8,8 @@ import numpy as np
 
 from kempf.pipeline.ingest.decoded import NO_TIME, Nanoseconds
 from kempf.pipeline.ingest.mcap.arrivals import Arrivals
-from kempf.pipeline.ingest.text.times import SECOND_NS, instant_words
+from kempf.schemas.instants import iso_cut
+from kempf.schemas.units import SECOND_NS
 
 #: A step of less than this, ns, is that of messages written in another order.
 _LEAST_NS = SECOND_NS // 4
@@ -80,7 +81,7 @@ def without_steps(topics: list[Arrivals]) -> Stepped:
         size = by_stamps
         if size is None and place.step_ns < 0 and _gone_over_twice(frequent, place):
             size = _continued(frequent, place)
-        at = instant_words(place.before_ns)
+        at = iso_cut(place.before_ns)
         if size is not None and abs(size) >= _LEAST_NS:
             moved = True
             for topic in topics:
@@ -121,7 +122,7 @@ def _doubled(topics: list[Arrivals]) -> tuple[str, ...]:
     # after a silence they are those that waited
     if np.any(around < _COVERED) or np.any(around > _TWICE[0]):
         return ()
-    at = instant_words(start + first * SECOND_NS, "s")
+    at = iso_cut(start + first * SECOND_NS, "s")
     return (
         f"For {behind - first} s from {at} on every topic comes twice as often: the recorder's clock was set back "
         "there and the file sorted by its times since, so that what was measured before and behind is mixed. Give the "

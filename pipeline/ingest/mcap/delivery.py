@@ -15,7 +15,7 @@ from kempf.pipeline.ingest.mcap.arrivals import Arrivals
 from kempf.pipeline.ingest.mcap.corrected import Corrected
 from kempf.pipeline.ingest.mcap.transit import EARLY_NS, least_transit
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 #: Messages of a topic by which it is judged, and share of them that have to carry a stamp.
 _LEAST, _STAMPED = 20, 0.99

@@ -10,7 +10,7 @@ from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
 from kempf.pipeline.ingest.mcap.fields import numbers_of
 from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
 from kempf.pipeline.ingest.spans import Index, Spans
-from kempf.pipeline.ingest.text.times import instant_words
+from kempf.schemas.instants import iso_cut
 
 #: Messages without a field before its first one, or after its last one, that are worth a note, and their share of all.
 _MANY, _SHARE = 20, 0.05
@@ -134,7 +134,7 @@ class FieldsSeen:
                 if many < _MANY or many < _SHARE * ends.messages or key in numbers:
                     continue
                 named = ", ".join(numbers[:_NAMED])
-                when = f"{'until' if where == 'first' else 'from'} {instant_words(at)}"
+                when = f"{'until' if where == 'first' else 'from'} {iso_cut(at)}"
                 notes.append(
                     f"The {where} {many} of {ends.messages} messages of {topic}, {when}{' on' * (where == 'last')}, do "
                     f"not give the field {key}{f'; they have {named}' if named else ''}. If it has another name there, "

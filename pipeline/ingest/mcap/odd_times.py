@@ -8,9 +8,10 @@ import numpy as np
 
 from kempf.pipeline.ingest.decoded import Nanoseconds
 from kempf.pipeline.ingest.messages.columns import Columns
-from kempf.pipeline.ingest.text.times import NS_PER, SECOND_NS
+from kempf.pipeline.ingest.text.times import NS_PER
 from kempf.schemas.errors import UsageError
 from kempf.schemas.profile import TimeColumn
+from kempf.schemas.units import SECOND_NS
 
 #: Nanoseconds since 1970 of the years in which a clock that is set may be, 2000 to 2100.
 _SINCE_NS, _UNTIL_NS = 946_684_800 * SECOND_NS, 4_102_444_800 * SECOND_NS

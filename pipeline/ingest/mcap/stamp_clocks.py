@@ -16,7 +16,7 @@ from kempf.pipeline.ingest.mcap.arrivals import Arrivals
 from kempf.pipeline.ingest.mcap.corrected import Corrected
 from kempf.pipeline.ingest.mcap.transit import EARLY_NS, least_transit
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
-from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
+from kempf.schemas.units import DAY_NS, SECOND_NS
 
 #: Messages of a topic by which its clock is judged.
 _LEAST = 20

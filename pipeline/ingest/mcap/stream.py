@@ -45,7 +45,7 @@ from kempf.pipeline.ingest.mcap.unchunked import FIRST_WINDOW, WINDOW, believed,
 from kempf.pipeline.ingest.mcap.walk import HEAD, walk
 from kempf.pipeline.ingest.sniff import MCAP_MAGIC
 from kempf.pipeline.ingest.spans import Index, as_bytes
-from kempf.pipeline.ingest.text.times import instant_words
+from kempf.schemas.instants import iso_cut
 
 #: Bytes that are known of a message whose chunk is lost: two places, its channel, two times.
 _HEADS = 40
@@ -375,7 +375,7 @@ def _alone(opcode: int, length: int) -> tuple[NDArray[np.uint8], Index, Index]:
 
 def _span(lost: LostStretch) -> str:
     """Return log times as a person reads them, nothing where they are not known."""
-    since, until = (None if ns is None else instant_words(ns) for ns in (lost.since_ns, lost.until_ns))
+    since, until = (None if ns is None else iso_cut(ns) for ns in (lost.since_ns, lost.until_ns))
     if since is None:
         return f"log times until {until}" if until else ""
     return f"log times {since} to {until}" if until else f"log times from {since} on"

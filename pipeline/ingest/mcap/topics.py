@@ -14,9 +14,10 @@ from kempf.pipeline.ingest.mcap.unread import unread
 from kempf.pipeline.ingest.messages.columns import Columns, MessageReader
 from kempf.pipeline.ingest.spans import Spans
 from kempf.pipeline.ingest.text.row_times import text_instants
-from kempf.pipeline.ingest.text.times import NS_PER, SECOND_NS
+from kempf.pipeline.ingest.text.times import NS_PER
 from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
 from kempf.schemas.profile import ChannelMap, TimeColumn, start_ns
+from kempf.schemas.units import SECOND_NS
 
 #: Parts of a quaternion, and the angles that are made of it.
 _QUATERNION = ("x", "y", "z", "w")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.ingest.decoded import Nanoseconds
-from kempf.pipeline.ingest.text.times import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 #: The least is taken over so long, ns, and over so many messages at the fewest.
 _OVER_NS, _FEWEST = 20 * SECOND_NS, 10

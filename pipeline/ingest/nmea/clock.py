@@ -15,8 +15,9 @@ from kempf.pipeline.ingest.nmea.receiver import fixes_of_one, speaking
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
+from kempf.pipeline.ingest.text.times import date, time_of_day, year_month_day
 from kempf.schemas.nmea import SENTENCES
+from kempf.schemas.units import DAY_NS, SECOND_NS
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
 _LEAST_AGREEMENTS, _RATIO = 5, 2

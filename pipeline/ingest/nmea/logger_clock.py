@@ -10,7 +10,7 @@ from kempf.pipeline.ingest.bursts import spread
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.nmea.receiver import ARRIVES_NS
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
+from kempf.schemas.units import DAY_NS, SECOND_NS
 
 #: A receiver that sends so late, or a clock that is so far off or leaps so far, is worth a note, ns.
 _WORTH_NS = SECOND_NS // 2

@@ -9,8 +9,8 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.nmea.frames import Frames
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS
 from kempf.schemas.nmea import SATELLITES
+from kempf.schemas.units import DAY_NS, SECOND_NS
 
 #: A receiver is silent where its sentences are farther apart than so many of their usual distances, in lines.
 _SILENT = 3

@@ -17,7 +17,7 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within
 from kempf.pipeline.ingest.text.cells import Cells
-from kempf.pipeline.ingest.text.times import SECOND_NS
+from kempf.schemas.units import SECOND_NS
 
 BACKSLASH = 92
 _COLON, _C, _COMMA, _STAR = 58, 99, 44, 42

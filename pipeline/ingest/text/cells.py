@@ -29,7 +29,7 @@ _PAIRS = np.uint64(0x000000FF000000FF)
 
 #: Word that keeps the last k bytes of eight, k = 0 ... 8.
 _KEEP = np.array([0] + [((1 << 8 * k) - 1) << 8 * (8 - k) for k in range(1, 9)], dtype=np.uint64)
-_POWER = 10 ** np.arange(10, dtype=np.int64)
+POWERS_OF_TEN = 10 ** np.arange(10, dtype=np.int64)
 
 #: Integers up to here are exact as floats, so that one division by a power of ten rounds once, as the reading of
 #: decimal text does.
@@ -204,9 +204,9 @@ class Cells:
         whole = _last_digits(words(buffer, whole_stop - 8), np.clip(digits, 0, 8))
         part = _last_digits(tail, decimals)
         good &= all_digits(whole) & all_digits(part)
-        digits_value = eight_digits(whole) * _POWER[decimals] + eight_digits(part)
+        digits_value = eight_digits(whole) * POWERS_OF_TEN[decimals] + eight_digits(part)
         good &= digits_value <= _EXACT
-        value: Float = digits_value / _POWER.astype(np.float64)[decimals]
+        value: Float = digits_value / POWERS_OF_TEN.astype(np.float64)[decimals]
         value = np.where(negative, -value, value)
         value[~good] = np.nan
         rest = np.flatnonzero(~good & (length > 0) & (length <= _LONGEST))

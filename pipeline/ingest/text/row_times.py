@@ -11,15 +11,13 @@ import polars as pl
 
 from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index, Spans, spans_of
-from kempf.pipeline.ingest.text.times import SECOND_NS, decimal_times, iso_instants
+from kempf.pipeline.ingest.text.times import CENTURY_FROM, decimal_times, iso_instants
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.profile import TimeColumn, start_ns
+from kempf.schemas.units import SECOND_NS
 
 #: Largest count of nanoseconds that is added to a start, so that the sum is an int64.
 _FARTHEST = 1 << 62
-
-#: Two-digit years from here on are of the last century.
-_CENTURY = 70
 
 #: Share of the stamps, at either end, that may be damaged without a word on the interval.
 _DAMAGED = 0.005
@@ -255,7 +253,7 @@ def _iso_dates(text: pl.Series, form: str | None) -> pl.Series:
     pattern = _ISO_DATES if form is None else f"^{_date_pattern(form)}$"
     parts = pl.col("text").str.extract_groups(pattern).struct
     year = parts.field("y")
-    last = pl.when(year.cast(pl.Int64, strict=False) >= _CENTURY).then(pl.lit("19")).otherwise(pl.lit("20"))
+    last = pl.when(year.cast(pl.Int64, strict=False) >= CENTURY_FROM).then(pl.lit("19")).otherwise(pl.lit("20"))
     full = pl.when(year.str.len_bytes() == 2).then(last + year).otherwise(year)
     month, day = parts.field("m"), parts.field("d").str.pad_start(2, "0")
     if form is not None and "mmm" in form:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from decimal import ROUND_HALF_EVEN, Decimal, InvalidOperation
-from typing import Literal
 
 import numpy as np
 import polars as pl
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
 from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import (
+    POWERS_OF_TEN,
     Cells,
     Word,
     all_digits,
@@ -21,18 +21,15 @@ from kempf.pipeline.ingest.text.cells import (
     leading_digits,
     words,
 )
-
-DAY_NS = 86_400_000_000_000
-SECOND_NS = 1_000_000_000
+from kempf.schemas.units import DAY_NS, MILLISECOND_NS, SECOND_NS
 
 #: Nanoseconds of every unit that a profile may give a time in.
-NS_PER: Mapping[str, int] = {"s": SECOND_NS, "ms": 1_000_000, "us": 1_000, "ns": 1, "d": DAY_NS}
+NS_PER: Mapping[str, int] = {"s": SECOND_NS, "ms": MILLISECOND_NS, "us": 1_000, "ns": 1, "d": DAY_NS}
 
 _MONTH_DAYS = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
-_POWER = 10 ** np.arange(10, dtype=np.int64)
 
 #: Two-digit years from here on are of the last century.
-_CENTURY = 70
+CENTURY_FROM = 70
 
 #: Decimal places of one nanosecond in each unit.
 _PLACES = {"s": 9, "ms": 6, "us": 3, "ns": 0}
@@ -66,17 +63,6 @@ def days_since_1970(
     y = year - (month <= 2)
     of_year = (153 * (month + np.where(month > 2, -3, 9)) + 2) // 5 + day - 1
     return 365 * y + y // 4 - y // 100 + y // 400 + of_year - 719_468, exists
-
-
-def instant_words(time_utc_ns: int, unit: Literal["s", "ms"] = "ms") -> str:
-    """Return an instant as messages write it, cut to a unit.
-
-    Examples
-    --------
-    >>> instant_words(1_746_252_300_640_000_000), instant_words(1_746_252_300_640_000_000, "s")
-    ('2025-05-03T06:05:00.640Z', '2025-05-03T06:05:00Z')
-    """
-    return f"{np.datetime64(time_utc_ns, 'ns').astype(f'datetime64[{unit}]')}Z"
 
 
 def iso_instants(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
@@ -151,7 +137,7 @@ def _between_signs(word: Word, form: str) -> tuple[Index, Flag]:
     mask = np.uint64(sum(0xFF << 8 * k for k in range(8) if k >= len(form) or form[k] != "0"))
     signs = np.uint64(sum(ord(sign) << 8 * k for k, sign in enumerate(form) if sign not in "0 "))
     digits = (word & ~mask) | np.uint64(zeros)
-    value = eight_digits(digits) // int(_POWER[8 - len(form)])
+    value = eight_digits(digits) // int(POWERS_OF_TEN[8 - len(form)])
     return value, ((word & mask) == signs) & all_digits(digits)
 
 
@@ -164,7 +150,7 @@ def _fraction(text: Spans) -> tuple[Index, Index, Flag]:
     place = place + point
     early = words(text.buffer, np.minimum(place, end))
     count = np.where(point, np.clip(np.minimum(leading_digits(early), text.stop - place), 0, None), 0)
-    value = eight_digits(first_digits(early, count)) * _POWER[9 - count]
+    value = eight_digits(first_digits(early, count)) * POWERS_OF_TEN[9 - count]
     long = np.flatnonzero(count == 8)
     if long.size:
         late = words(text.buffer, np.minimum(place[long] + 8, end))
@@ -219,7 +205,7 @@ def time_of_day(cells: Cells) -> Nanoseconds:
     decimals = np.clip(length - 7, 0, None)
     count = leading_digits(early)
     first = np.minimum(np.where(point, decimals, 0), 8)
-    fraction = eight_digits(first_digits(early, np.minimum(first, count))) * _POWER[9 - first]
+    fraction = eight_digits(first_digits(early, np.minimum(first, count))) * POWERS_OF_TEN[9 - first]
     long = np.flatnonzero(decimals > 8)
     if long.size:
         late = words(cells.buffer, np.minimum(cells.start[long] + 15, size + 1))
@@ -241,7 +227,7 @@ def date(cells: Cells) -> Nanoseconds:
     often = np.diff(heads, append=value.size)
     value = value[heads]
     day, month, year = value // 10_000, value // 100 % 100, value % 100
-    days, exists = days_since_1970(year + np.where(year >= _CENTURY, 1900, 2000), month, day)
+    days, exists = days_since_1970(year + np.where(year >= CENTURY_FROM, 1900, 2000), month, day)
     return np.where(good & np.repeat(exists, often), np.repeat(days * DAY_NS, often), NO_TIME)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.means import mean_of_line
 from kempf.pipeline.channels.recursion import filtered
+from kempf.pipeline.channels.running_mean import running_mean
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.surge.usual import KINDS, SETTLED_STD, UNSETTLED, UNSETTLED_STD
@@ -128,6 +129,4 @@ def _lateral(run: GridRun, length_m: float) -> Float | None:
 def _smooth(run: GridRun, laid: Float, length_m: float) -> Float:
     """Return a course without its noise: a ship's motion does not change within a quarter of her length."""
     width = max(1, round(0.25 * length_m / max(run.approach_m_s, 0.05) / run.step_s))
-    padded = np.pad(laid, (width // 2, width - 1 - width // 2), mode="edge")
-    smooth: Float = np.convolve(padded, np.ones(width) / width, mode="valid")
-    return smooth
+    return running_mean(laid, width)

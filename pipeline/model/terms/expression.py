@@ -11,6 +11,7 @@ import numpy as np
 
 from kempf.pipeline.model.terms import program
 from kempf.pipeline.model.terms.program import DEPTH, Program
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
 
 _LONGEST = 4000
@@ -243,7 +244,7 @@ class _Writing:
             raise _unknown(name, node.col_offset, self.text, list(FUNCTIONS))
         instruction, count = FUNCTIONS[name]
         if len(node.args) != count or node.keywords:
-            raise _wrong(self.text, node.col_offset + 1, f"{name} takes {count} argument{'s' * (count > 1)}")
+            raise _wrong(self.text, node.col_offset + 1, f"{name} takes {counted(count, 'argument')}")
         for k, argument in enumerate(node.args):
             self.write(argument, height + k)
         self.code.append((instruction, 0))

@@ -19,7 +19,7 @@ from kempf.pipeline.model.terms.places import Place, places, require_in_place, s
 from kempf.pipeline.model.terms.program import DEPTH, Program
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
-from kempf.schemas.symbols import STATE_SYMBOLS, SYMBOLS
+from kempf.schemas.symbols import INDEX, STATE_SYMBOLS, SYMBOLS
 
 _SHIP = {
     **dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), mariner_like(100.0).array().tolist(), strict=True)),
@@ -42,7 +42,6 @@ _STATES = (
     (0.05, 0.001, 0.0, 0.02, 1.0, 1.0, 0.1, 0.5, 30.0, 0.01, 2.5, 600.0, 0.0),
     (-0.02, -0.002, 0.02, -0.02, 0.5, 0.5, -0.1, 0.0, 30.0, -0.01, 0.9, 900.0, 0.0),
 )
-_INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 _SHOWN = ("v", "r", "delta", "V", "psi")
 
 
@@ -69,12 +68,12 @@ def answer(text: str, parameters: Mapping[str, float], own_states: tuple[str, ..
     UsageError
         ``expression_invalid``.
     """
-    index = {name: _INDEX[name] for name in symbols_beside(own_states)}
+    index = {name: INDEX[name] for name in symbols_beside(own_states)}
     program = compiled(text, index | {name: len(SYMBOLS) + i for i, name in enumerate(parameters)})
     values = np.zeros(len(SYMBOLS) + len(parameters))
     values[len(SYMBOLS) :] = list(parameters.values())
     for name, number in {**_SHIP, **dict.fromkeys(own_states, level)}.items():
-        values[_INDEX[name]] = number
+        values[INDEX[name]] = number
     rows = [run(program, _filled(values, state)) for state in _STATES]
     return Answer(np.array([row[0] for row in rows]), np.array([row[1:] for row in rows]))
 
@@ -100,10 +99,10 @@ def run(program: Program, values: Float) -> Float:
 def _filled(values: Float, state: tuple[float, ...]) -> Float:
     filled = values.copy()
     for name, number in zip(_COLUMNS, state, strict=True):
-        filled[_INDEX[name]] = number
-    filled[_INDEX["F"]], filled[_INDEX["M"]] = 0.01 * state[0], 0.01 * state[1]
-    filled[_INDEX["vdot"]], filled[_INDEX["rdot"]] = -0.05 * state[0], -0.05 * state[1]
-    filled[_INDEX["vddot"]], filled[_INDEX["rddot"]] = 0.003 * state[0], 0.003 * state[1]
+        filled[INDEX[name]] = number
+    filled[INDEX["F"]], filled[INDEX["M"]] = 0.01 * state[0], 0.01 * state[1]
+    filled[INDEX["vdot"]], filled[INDEX["rdot"]] = -0.05 * state[0], -0.05 * state[1]
+    filled[INDEX["vddot"]], filled[INDEX["rddot"]] = 0.003 * state[0], 0.003 * state[1]
     return filled
 
 

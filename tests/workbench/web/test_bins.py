@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import Series
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.charts.bins import _BLOCKS, reduced
 from kempf.workbench.charts.frames import encoded
 from tests.workbench.web.decoded import decoded

@@ -14,10 +14,10 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.ingest.decoded import LostStretch
+from kempf.schemas.instants import iso_utc
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse import delta, logs, notes
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
 from kempf.workbench import static_files
 from kempf.workbench.cli.entry import main

@@ -34,8 +34,6 @@ HORIZONS = (
 )
 #: predictions kept: the ones made longest ago go first
 _MOST = 200
-#: what a model predicts, with the unit that its columns end with
-UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 #: what the name of a column begins with that holds at which instants evidence shows
 MARK = "mark "
 

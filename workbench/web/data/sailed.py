@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-from kempf.flows.jobs.predict_request import Kind, PredictRequest, Side, angles_of, required
+from kempf.flows.jobs.predict_request import Kind, PredictRequest, angles_of, required
 from kempf.schemas.errors import UsageError
+from kempf.schemas.side import Side
 from kempf.workbench.web.form_numbers import number_of
 
 if TYPE_CHECKING:

@@ -7,13 +7,12 @@ from typing import Any
 
 from markupsafe import Markup
 
+from kempf.schemas.confidence import NORMAL_95
 from kempf.workbench.web.draw.frame import LEFT, RIGHT
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _ROW, _NAMES, _TOP = 640.0, 20.0, 150.0, 6.0
-#: differences beyond which two sets of one ship are not expected to lie, standard errors
-_LIMIT = 1.959964
 
 
 def draw_differences(rows: Sequence[Mapping[str, Any]]) -> Markup | None:
@@ -37,9 +36,9 @@ def draw_differences(rows: Sequence[Mapping[str, Any]]) -> Markup | None:
     parts = [
         element(
             "rect",
-            x=x(-_LIMIT),
+            x=x(-NORMAL_95),
             y=_TOP,
-            width=x(_LIMIT) - x(-_LIMIT),
+            width=x(NORMAL_95) - x(-NORMAL_95),
             height=bottom - _TOP,
             class_="expected",
         )

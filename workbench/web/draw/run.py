@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.pipeline.channels.series import Float, Mask
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.charts.signs import STARBOARD
 from kempf.workbench.charts.turns import within_a_turn
 from kempf.workbench.web.draw.scale import ticks

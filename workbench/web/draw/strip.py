@@ -9,16 +9,14 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.schemas.enumeration import as_words
-from kempf.workbench.web.data.predictions import UNITS
+from kempf.schemas.motion_channel import MOTION
+from kempf.schemas.units import SECOND_NS
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import element
 
 _WIDTH, _HEIGHT, _POINTS = 320.0, 36.0, 100
-_DEG = 180.0 / np.pi
-#: What a channel is shown in, with the factor from SI.
-_SHOWN_IN = {"yaw_rate": ("deg/s", _DEG), "heading": ("deg", _DEG), "lateral_speed": ("m/s", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -46,7 +44,7 @@ def draw_strips(
     marked : mapping
         By manoeuvre the instants that are shaded, shape (n,).
     """
-    of, (unit, factor) = UNITS[channel], _SHOWN_IN[channel]
+    of, (unit, factor) = MOTION[channel].suffix, MOTION[channel].shown
     left = {name: factor * (run[f"{channel}_{of}"] - run[f"{channel}_predicted_{of}"]) for name, run in columns.items()}
     known = [np.abs(values[np.isfinite(values)]) for values in left.values()]
     reach = float(max((np.max(values) for values in known if values.size), default=0.0))

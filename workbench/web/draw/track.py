@@ -10,7 +10,7 @@ from markupsafe import Markup
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.positions import plane
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, wrapped
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _HEIGHT, _EDGE = 640.0, 420.0, 24.0
@@ -30,8 +30,7 @@ def draw_track(channels: Instruments, manoeuvres: Sequence[tuple[int, int]]) -> 
     if latitude is None or longitude is None or len(latitude) < 2 or len(latitude) != len(longitude):
         return None
     # the shorter way round, so that a track across 180 deg holds together
-    turn = (longitude.value - longitude.value[0] + np.pi) % (2.0 * np.pi) - np.pi
-    north, east = plane(latitude.value, turn)
+    north, east = plane(latitude.value, wrapped(longitude.value - longitude.value[0]))
     scale = min(
         (_WIDTH - 2 * _EDGE) / max(float(np.ptp(east)), 1.0), (_HEIGHT - 2 * _EDGE) / max(float(np.ptp(north)), 1.0)
     )

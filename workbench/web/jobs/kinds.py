@@ -16,7 +16,7 @@ from urllib.parse import urlencode
 
 from kempf.flows.process.progress import Progress
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 
 
 def as_asked(arguments: Mapping[str, Any]) -> dict[str, str]:

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from kempf.flows.jobs.vessel_report import FLOW
+from kempf.schemas.instants import iso_utc
 from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views
 from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.vessel_counts import counted, vessel_counts
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from itertools import groupby
-from typing import Any
+from typing import Any, get_args
 
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.standing_model import require_current
 from kempf.flows.jobs.vessel_state import fleet_state
 from kempf.pipeline.predict.horizon import horizon_of
+from kempf.schemas.correction import Action
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import segments, vessels
@@ -26,7 +27,7 @@ from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.window import instant
 
 Arguments = dict[str, Any]
-_ACTIONS = ("correct", "exclude", "accept", "add")
+_ACTIONS: tuple[Action, ...] = get_args(Action)
 #: letters of a reason
 _MOST_REASON = 2000
 

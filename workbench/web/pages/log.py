@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse import logs, lost, notes, segments
-from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.logs import log_document
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from kempf.schemas.enumeration import as_words
+from kempf.schemas.instants import iso_utc, minute
 from kempf.warehouse import aliases, logs, lost, notes, segments
-from kempf.warehouse.instant import iso_utc
 from kempf.workbench.charts.channels import derived
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
@@ -79,7 +79,7 @@ def gather(app_state: AppState, segment_id: str, fields: Mapping[str, str]) -> P
             }
             content |= {"channels": [*content["channels"], derived()]}
             content["stretch"] = _stretch(prediction, set_id, horizon, fields.get("worst", ""))
-    title = f"{span_of(segment)['words']}, {iso_utc(segment.start_utc_ns)[:16].replace('T', ' ')} UTC"
+    title = f"{span_of(segment)['words']}, {minute(iso_utc(segment.start_utc_ns))} UTC"
     above = ((row.vessel, of_vessel(row.vessel)), (row.file_name, f"/logs/{row.log_id}"))
     return Page("manoeuvre.html", title, content, above)
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from kempf.schemas.instants import iso_utc, minute
 from kempf.warehouse import logs, segments
-from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.documents.manoeuvres import logs_begin_alike
@@ -27,7 +27,7 @@ def names_of(warehouse: Warehouse, vessel: str, *, when: bool = True) -> dict[st
     alike = logs_begin_alike((iso_utc(one.start_utc_ns), one.ingest_id) for one in found)
     return {
         one.segment_id: kind_and_side(one)
-        + (f", {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')}" if when else "")
+        + (f", {minute(iso_utc(one.start_utc_ns))}" if when else "")
         + (f", {files[one.ingest_id]}" if alike and one.ingest_id in files else "")
         for one in found
     }

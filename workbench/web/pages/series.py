@@ -12,13 +12,14 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.motion_channel import MOTION
 from kempf.warehouse import logs, segments
 from kempf.workbench.charts.bins import Shown, reduced
 from kempf.workbench.charts.channels import LATERAL, entry
 from kempf.workbench.charts.frames import encoded
 from kempf.workbench.charts.turns import within_a_turn
 from kempf.workbench.web.app_state import AppState
-from kempf.workbench.web.data.predictions import UNITS, kept_of
+from kempf.workbench.web.data.predictions import kept_of
 from kempf.workbench.web.window import window
 
 #: stretches that a chart may tell apart, channels that an answer may have
@@ -97,8 +98,8 @@ def predicted_frame(app_state: AppState, segment_id: str, fields: Mapping[str, s
     row = logs.of_ingest(app_state.warehouse, segment.ingest_id)
     begin, end = window(fields.get("from"), fields.get("to"), row.start_utc_ns, row.end_utc_ns)
     few, columns = max(1, min(bins, MOST_BINS)), prediction.series(segment.segment_id)
-    names = {LATERAL: f"{LATERAL}_{UNITS[LATERAL]}"}
-    names |= {f"{name}:predicted": f"{name}_predicted_{unit}" for name, unit in UNITS.items()}
+    names = {LATERAL: f"{LATERAL}_{MOTION[LATERAL].suffix}"}
+    names |= {f"{name}:predicted": f"{name}_predicted_{channel.suffix}" for name, channel in MOTION.items()}
     shown = {}
     for name, column in names.items():
         known = np.isfinite(columns[column])

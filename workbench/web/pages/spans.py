@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from kempf.pipeline.ingest.decoded import LostStretch
-from kempf.warehouse.instant import iso_utc
+from kempf.schemas.instants import iso_utc
 from kempf.warehouse.notes import Note
 from kempf.warehouse.segments import Segment
 

@@ -22,7 +22,7 @@ FALLS = 3.5
 #: and part of it, below which a fall is of no use to anybody
 LEAST_FALL = 0.05
 #: share of the manoeuvres that must be predicted better
-MOST = 2.0 / 3.0
+SHARE_BETTER = 2.0 / 3.0
 #: share of the repetitions, each without one manoeuvre, that must choose what predicts alike
 STABLE = 0.9
 #: standard errors within which two models predict alike, and beyond which one is worse
@@ -49,7 +49,7 @@ def falls(before: Ahead, after: Ahead) -> bool:
     return bool(
         comparison.in_std > FALLS
         and comparison.falls_by > LEAST_FALL
-        and comparison.better >= MOST * comparison.of
+        and comparison.better >= SHARE_BETTER * comparison.of
         and not worsens(before, after)
     )
 

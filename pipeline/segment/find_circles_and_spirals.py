@@ -14,21 +14,19 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.pull_out import PullOut, paired, pull_out
-from kempf.pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.segment.settings import STANDARD
 from kempf.pipeline.segment.spiral import Spiral, find_spirals
-from kempf.pipeline.segment.turning_circle import TurningCircle, turning_circle
+from kempf.pipeline.segment.turning_circle import MeasuredCircle, turning_circle
 from kempf.pipeline.segment.turns import find_turns, regions
 from kempf.pipeline.segment.zigzag import Zigzag
-
-_DEFAULT = SegmentSettings()
 
 #: Smallest turn about which circles, pull-outs and spirals are looked for, rad.
 _SMALLEST_TURN_RAD = float(np.pi / 3)
 
 
-def find_turning(
-    instruments: Instruments, zigzags: Sequence[Zigzag] = (), settings: SegmentSettings = _DEFAULT
-) -> list[TurningCircle | PullOut | Spiral]:
+def find_circles_and_spirals(
+    instruments: Instruments, zigzags: Sequence[Zigzag] = ()
+) -> list[MeasuredCircle | PullOut | Spiral]:
     """Find every turning circle, pull-out and direct spiral in a log.
 
     Parameters
@@ -37,12 +35,10 @@ def find_turning(
         Series of the log: heading and rudder angle, and for lengths positions or speeds.
     zigzags : sequence of Zigzag, optional
         What was found before: nothing that overlaps one is reported.
-    settings : SegmentSettings, optional
-        Thresholds.
 
     Returns
     -------
-    list of TurningCircle, PullOut or Spiral
+    list of MeasuredCircle, PullOut or Spiral
         In order of time; empty where there is none, or heading or rudder are missing. A step of a spiral is no circle
         and no pull-out.
 
@@ -57,21 +53,21 @@ def find_turning(
     begin_s = max(float(signals.heading_s[0]), float(signals.rudder_s[0]))
     end_s = min(float(signals.heading_s[-1]), float(signals.rudder_s[-1]))
     turns = find_turns(signals.heading_s, signals.heading, _SMALLEST_TURN_RAD)
-    manoeuvres: list[TurningCircle | PullOut | Spiral] = []
+    manoeuvres: list[MeasuredCircle | PullOut | Spiral] = []
     pull_outs: list[PullOut] = []
     for start, end in regions(turns, begin_s, end_s):
         first, behind = np.searchsorted(signals.rudder_s, [start, end + 1e-9])
         stretches = held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
         free = [stretch for stretch in stretches if not _in_zigzag(signals, stretch, zigzags)]
-        spirals = find_spirals(signals, free, settings)
+        spirals = find_spirals(signals, free, STANDARD)
         manoeuvres += spirals
         left = [s for s in free if not any(spiral.holds(signals.utc_ns(s.start_s)) for spiral in spirals)]
         for k, stretch in enumerate(left):
-            circle = turning_circle(signals, instruments, stretch, settings)
+            circle = turning_circle(signals, instruments, stretch, STANDARD)
             if circle is not None:
                 manoeuvres.append(circle)
             if k:
-                pulled = pull_out(signals, left[k - 1], stretch, settings)
+                pulled = pull_out(signals, left[k - 1], stretch, STANDARD)
                 if pulled is not None:
                     pull_outs.append(pulled)
     return sorted(

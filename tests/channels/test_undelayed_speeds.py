@@ -9,8 +9,9 @@ from kempf.pipeline.channels.doctor.log import EARTH_M, Log
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import velocity_lateness
-from kempf.pipeline.channels.punctual import apart, punctual, unsmoothed
-from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.channels.undelayed_speeds import apart, undelayed_speeds, unsmoothed
+from kempf.schemas.units import SECOND_NS
 
 SPEED, PERIOD_S, LONG_S = 1.8, 0.2, 300.0
 FIX_STD_M, VELOCITY_STD_M_S = 0.8, 0.015
@@ -66,7 +67,7 @@ def test_a_smoothed_velocity_is_as_late_as_its_filter_makes_it() -> None:
 
 def test_it_is_undone_and_said() -> None:
     ship, there = boat(smoothed_s=0.4), boat()
-    found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+    found = undelayed_speeds(ship, 0, int(LONG_S * SECOND_NS))
     assert any("late beside the fixes" in sentence for sentence in found.said)
     assert 0.0 < found.errors.smoothing_s < 0.1
     off = [found.instruments.series["course_over_ground"], ship.series["course_over_ground"]]
@@ -78,7 +79,7 @@ def test_what_is_not_late_stays_as_it_is() -> None:
     # a receiver that is late as a whole is an effect to be named, and shows nothing here
     for late_s in (0.0, 0.3):
         ship = boat(late_s)
-        found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+        found = undelayed_speeds(ship, 0, int(LONG_S * SECOND_NS))
         assert found.instruments is ship
         assert found.said == ()
         assert found.errors == IN_THE_LOG
@@ -90,7 +91,7 @@ def test_what_may_be_late_is_left_and_not_known() -> None:
     for seed in range(40):
         ship = boat(smoothed_s=0.1, seed=seed)
         late_s, std_s = of_velocity(ship)
-        found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+        found = undelayed_speeds(ship, 0, int(LONG_S * SECOND_NS))
         same = found.instruments is ship
         if late_s > 2.326 * std_s:
             kinds.add("undone")
@@ -108,7 +109,7 @@ def test_what_lateness_takes_from_the_lateral_speed_is_its_difference() -> None:
     """Eq. (18) of a velocity from which a little more is taken, less that of the velocity as it is."""
     ship, more_s = boat(smoothed_s=0.4), 1e-4
     late_s, _ = of_velocity(ship)
-    found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+    found = undelayed_speeds(ship, 0, int(LONG_S * SECOND_NS))
     assert found.velocity is not None
     speed, course = (ship.series[name] for name in ("speed_over_ground", "course_over_ground"))
     less, more = (unsmoothed(speed, course, late_s + by) for by in (0.0, more_s))
@@ -125,7 +126,7 @@ def test_a_log_of_means_is_read_at_their_middle_one_after_the_other() -> None:
     speed = SPEED + 0.05 * np.sin(2.0 * np.pi * TIME / 60.0) + log.value - SPEED
     shown = np.convolve(np.concatenate([np.full(9, speed[0]), speed]), np.full(10, 0.1), mode="valid")
     late = Instruments({**ship.series, "speed_through_water": Series(log.time_utc_ns, shown)}, {}, ())
-    found = punctual(late, 0, int(LONG_S * SECOND_NS))
+    found = undelayed_speeds(late, 0, int(LONG_S * SECOND_NS))
     assert any("means over 2 s" in sentence for sentence in found.said)
     means = found.instruments.series["speed_through_water"]
     assert np.all(np.diff(means.time_utc_ns) == 10 * log.time_utc_ns[1])

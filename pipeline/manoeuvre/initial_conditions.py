@@ -11,8 +11,9 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.rounding import rounding_std
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
 from kempf.pipeline.manoeuvre.ship import Start
+from kempf.schemas.units import SECOND_NS
 
 Complex = NDArray[np.complex128]
 #: the beginning is read over this part of the time in which she sails her own length, and over no less than that, s
@@ -22,7 +23,7 @@ _INSTANTS = 400
 
 
 @dataclass(frozen=True)
-class Began:
+class InitialConditions:
     """A beginning; None and 0 where the log does not show it."""
 
     start: Start
@@ -37,7 +38,7 @@ class Began:
     #: from east, m/s; without rows where the log hardly has it.
     air: Float = field(default_factory=lambda: np.zeros((0, 3)), repr=False, compare=False)
 
-    def counted_from(self, heading_rad: float) -> Began:
+    def counted_from(self, heading_rad: float) -> InitialConditions:
         """Return it with directions counted from a heading instead of north."""
         north, east = self.air[:, 1], self.air[:, 2]
         ahead = north * np.cos(heading_rad) + east * np.sin(heading_rad)
@@ -46,7 +47,9 @@ class Began:
         return replace(self, wind_from_rad=self.wind_from_rad - heading_rad, air=air)
 
 
-def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_time_s: float) -> Began:
+def initial_conditions(
+    instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_time_s: float
+) -> InitialConditions:
     """Read how a manoeuvre began.
 
     Parameters
@@ -74,7 +77,9 @@ def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_ti
         forward_m_s=_std(instruments, channel, before / SECOND_NS),
         yaw_rate_rad_s=_std(instruments, "yaw_rate", before / SECOND_NS),
     )
-    return Began(start, std, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0])
+    return InitialConditions(
+        start, std, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0]
+    )
 
 
 def _std(instruments: Instruments, channel: str, over_s: float) -> float | None:

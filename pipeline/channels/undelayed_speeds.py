@@ -16,7 +16,8 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import InstantErrors, instant_errors, said_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
-from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series
+from kempf.pipeline.channels.series import Nanoseconds, Series
+from kempf.schemas.units import SECOND_NS
 
 #: time before and after a segment in which its instruments are looked at, s
 _AROUND_S = 1800
@@ -38,7 +39,7 @@ class VelocitySlope:
 
 
 @dataclass(frozen=True, eq=False)
-class Punctual:
+class UndelayedSpeeds:
     """A log whose speeds are not late."""
 
     #: The very same where nothing was late.
@@ -53,7 +54,7 @@ class Punctual:
     log_mean_s: float = 0.0
 
 
-def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Punctual:
+def undelayed_speeds(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> UndelayedSpeeds:
     """Return a log with speeds that are not late, for one of its segments.
 
     Parameters
@@ -93,7 +94,7 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
         sentences.append(f"the speed log shows means over {mean_s:.2g} s: taken at their middle, one after the other")
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
     errors = instant_errors(instruments.instant_std_s, late_std_s)
-    return Punctual(whole, (*sentences, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
+    return UndelayedSpeeds(whole, (*sentences, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
 
 
 def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:

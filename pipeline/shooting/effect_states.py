@@ -19,7 +19,7 @@ from kempf.pipeline.model.lanes import at, put
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def lead(  # type: ignore[no-untyped-def]
+def integrate_effect_states(  # type: ignore[no-untyped-def]
     hull, parameters, step_s, inputs, rudder, current_row, constants_of_ship, course, own, table, states, lanes
 ):
     """Fill ``states`` with the effects' own at every instant of a run, by Heun's rule from nothing at its first.

@@ -8,11 +8,11 @@ from collections.abc import Mapping
 import numpy as np
 import polars as pl
 
-from kempf.pipeline.ingest.decoded import Misfit
+from kempf.pipeline.ingest.decoded import MalformedRows
 from kempf.pipeline.ingest.layout import Layout
 from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA
-from kempf.schemas.enumeration import at_the_beginning
+from kempf.schemas.enumeration import at_the_beginning, counted
 from kempf.schemas.profile import TimeColumn
 
 #: Damage is a few rows here and there: of so many, and of such a share, the layout is to blame.
@@ -63,7 +63,7 @@ _OTHER_DATE = r"^(?!\d{4}-\d\d-\d\d)\d{1,4}[-./ ](\d{1,2}|[A-Za-z]{3,9})[-./ ]\d
 _DATE_ADVICE = "The date is no yyyy-mm-dd: write its form into the source's time, as `date_form`."
 
 
-def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
+def cells_amiss(layout: Layout, count: Index, *, named: bool) -> MalformedRows | None:
     """Return what is to be said of rows with another number of cells than there are columns; None if they are few.
 
     Parameters
@@ -106,7 +106,7 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
             "Write a name for every cell of a row into the header, in a copy of the log, or into `columns` of the "
             "source (with `header_lines: 1` for the line that names them now); or correct `separator`."
         )
-    expected = f"the profile names {width} column{'s' if width != 1 else ''}" if named else f"the header has {width}"
+    expected = f"the profile names {counted(width, 'column')}" if named else f"the header has {width}"
     parted = {None: "", "whitespace": " parted by blanks", "\t": " parted by tabs"}.get(
         layout.separator, f" parted by {layout.separator!r}"
     )
@@ -114,11 +114,11 @@ def cells_amiss(layout: Layout, count: Index, *, named: bool) -> Misfit | None:
     others = f", and {more} {'has' if more == 1 else 'have'} another number" if more else ""
     has = "has" if at.size == 1 else "have"
     rows = at_the_beginning(_of_all(at.size, n))
-    found = f"{rows} {has} {usual} cell{'s' if usual != 1 else ''}{parted}{where}{others}; {expected}."
-    return Misfit(found, step, wrong.size)
+    found = f"{rows} {has} {counted(usual, 'cell')}{parted}{where}{others}; {expected}."
+    return MalformedRows(found, step, wrong.size)
 
 
-def quotations_amiss(layout: Layout, count: Index) -> Misfit | None:
+def quotations_amiss(layout: Layout, count: Index) -> MalformedRows | None:
     """Return what is to be said of rows with a quotation that is not closed; None if they are few.
 
     Parameters
@@ -141,12 +141,12 @@ def quotations_amiss(layout: Layout, count: Index) -> Misfit | None:
         "Export the log with a mark at either end of such a cell or with none, and without line ends within a cell; or "
         "take the marks out of a copy of it."
     )
-    return Misfit(found, step, amiss.size)
+    return MalformedRows(found, step, amiss.size)
 
 
 def times_amiss(
     rows: Spans, cells: Mapping[str, pl.Series], row: Index, unread: Index, column: TimeColumn
-) -> Misfit | None:
+) -> MalformedRows | None:
     """Return what is to be said of times that cannot be read; None if they are few.
 
     Parameters
@@ -175,7 +175,7 @@ def times_amiss(
     found = (
         f"The time of {_of_all(unread.size, len(rows))} cannot be read{said}, such as {quoted} of {_place(rows, one)}."
     )
-    return Misfit(found, " ".join([*_advice(list(shown.values()), column), _FORMS]), unread.size)
+    return MalformedRows(found, " ".join([*_advice(list(shown.values()), column), _FORMS]), unread.size)
 
 
 def _advice(shown: list[str], column: TimeColumn) -> list[str]:

@@ -10,17 +10,13 @@ from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.describe import describe
 from kempf.pipeline.segment.legs import find_chains
 from kempf.pipeline.segment.measured import Signals, measure
-from kempf.pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.segment.settings import STANDARD
 from kempf.pipeline.segment.short import is_trial
 from kempf.pipeline.segment.switching import Chain, Switching, zigzags_in
 from kempf.pipeline.segment.zigzag import Zigzag
 
-_DEFAULT = SegmentSettings()
 
-
-def find_manoeuvres(
-    heading: Series, rudder: Series, speed: Series | None = None, settings: SegmentSettings = _DEFAULT
-) -> list[Zigzag]:
+def find_zigzags(heading: Series, rudder: Series, speed: Series | None = None) -> list[Zigzag]:
     """Find every zigzag in a log.
 
     Parameters
@@ -31,8 +27,6 @@ def find_manoeuvres(
         Rudder angle at its own rate, rad, positive to starboard. Samples that a logger merely held should be left out.
     speed : Series, optional
         Speed through the water, m/s.
-    settings : SegmentSettings, optional
-        Thresholds.
 
     Returns
     -------
@@ -47,18 +41,16 @@ def find_manoeuvres(
         return []
     signals = Signals.of(heading, rudder)
     candidates: list[tuple[Chain, Switching, float]] = []
-    for legs in find_chains(signals.rudder_s, signals.rudder, settings):
-        chain, window_s = measure(signals, legs, settings)
+    for legs in find_chains(signals.rudder_s, signals.rudder, STANDARD):
+        chain, window_s = measure(signals, legs, STANDARD)
         candidates += [
             (chain, switching, window_s)
-            for switching in zigzags_in(chain, settings)
+            for switching in zigzags_in(chain, STANDARD)
             if is_trial(signals, chain, switching, window_s)
         ]
     # the same manoeuvre is seen at several rudder bands: the longest view of it, then the most regular one; few legs
     # from an approach that was not steady say least, and take nothing from the others
-    candidates.sort(
-        key=lambda c: (_says_least(c[1], settings), c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1]))
-    )
+    candidates.sort(key=lambda c: (_says_least(c[1]), c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1])))
     taken: list[tuple[Chain, Switching, float]] = []
     for candidate in candidates:
         begin, end = _span(candidate[0], candidate[1])
@@ -67,14 +59,14 @@ def find_manoeuvres(
             taken.append(candidate)
     taken.sort(key=lambda c: _span(c[0], c[1]))
     return [
-        describe(signals, chain, switching, window_s, speed=speed, settings=settings)
+        describe(signals, chain, switching, window_s, speed=speed, settings=STANDARD)
         for chain, switching, window_s in taken
     ]
 
 
-def _says_least(switching: Switching, settings: SegmentSettings) -> bool:
+def _says_least(switching: Switching) -> bool:
     """Whether a zigzag has few legs and an approach that was not steady."""
-    return switching.start == "turning" and switching.last - switching.first < settings.switchings_without_approach
+    return switching.start == "turning" and switching.last - switching.first < STANDARD.switchings_without_approach
 
 
 def _span(chain: Chain, switching: Switching) -> tuple[float, float]:
