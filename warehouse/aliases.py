@@ -123,6 +123,11 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
     return _pointed(delta.read(warehouse, "aliases", {"vessel_key": vessel_key(vessel)}))
 
 
+def of_model(pointed: Mapping[str, str]) -> str | None:
+    """Return which of a vessel's aliases says what her model is: the current set, or the one that was withdrawn."""
+    return pointed.get(CURRENT) or pointed.get(WITHDRAWN)
+
+
 def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     """Return the parameter set id that an alias points to, by vessel, sorted."""
     frame = delta.read(warehouse, "aliases", {})

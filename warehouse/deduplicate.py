@@ -19,11 +19,17 @@ _SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
 
 
 def once(segments: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:
-    """Return each manoeuvre once, see `same`, and why the others are left out.
+    """Return each manoeuvre once, and why the others are left out; see `twins`."""
+    left = twins(segments)
+    kept = [segment for segment in sorted(segments, key=_first_choice) if segment.segment_id not in left]
+    return kept, {name: f"another log holds the same manoeuvre, {twin}" for name, twin in left.items()}
+
+
+def twins(segments: Sequence[Segment]) -> dict[str, str]:
+    """Return which manoeuvres another log holds better, see `same`, by id, and the id of that one.
 
     Of twins the one with the most executes stays, of those the longest, of equally long ones the first by log.
     """
-    kept: list[Segment] = []
     left: dict[str, str] = {}
     stretches = _stretches(segments)
     # only what shares some time is compared: a vessel may have thousands
@@ -32,11 +38,10 @@ def once(segments: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:
         beside = kept_in.setdefault(bisect_right(stretches, segment.start_utc_ns), [])
         twin = next((other for other in beside if same(segment, other)), None)
         if twin is None:
-            kept.append(segment)
             beside.append(segment)
         else:
-            left[segment.segment_id] = f"another log holds the same manoeuvre, {twin.segment_id}"
-    return kept, left
+            left[segment.segment_id] = twin.segment_id
+    return left
 
 
 def _stretches(segments: Sequence[Segment]) -> list[int]:

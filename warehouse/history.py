@@ -118,7 +118,7 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, _Logs([], None, [], code_of(warehouse, "estimate"), then=True))
+            nothing = _exploded(None, vessel, _Logs([], None, {}, [], code_of(warehouse, "estimate"), then=True))
             return History(
                 nothing,
                 None,
@@ -127,12 +127,15 @@ def of_vessel(
             )
         frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None
+    held = frame["parameter_set_id"].n_unique()
     if not superseded:
         frame = frame.remove(frame["superseded"])
     note: str | None = None
     if frame.height == 0:
         vessels.require(warehouse, vessel)
         note = f"No parameter set of {vessel!r} " + ("is stored." if as_of is None else f"by {as_of.isoformat()}.")
+        if held:
+            note = f"All {held} parameter sets of {vessel!r} are superseded; `kempf history --all` shows them."
     elif parameter is not None:
         frame = _only(frame, parameter)
     return History(frame, version, note)
@@ -283,6 +286,8 @@ class _Logs:
     past: list[str]
     #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
+    #: Manoeuvres in these that another log holds better, by id, and the id of that one; not known of the past.
+    twins: Mapping[str, str]
     #: Notes on her and what is hers.
     notes: list[Note]
     #: Fingerprint under which the present code estimates.
@@ -295,7 +300,7 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return _Logs([], None, [], code_of(warehouse, "estimate"), then=True)
+        return _Logs([], None, {}, [], code_of(warehouse, "estimate"), then=True)
     columns = ("log_id", "ingest_id", "revision", "removed")
     rows = _read(warehouse, "logs", vessel, {}, columns, version).sort("log_id", "revision")
     last = {row["log_id"]: row for row in rows.rows(named=True)}
@@ -303,7 +308,15 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     segments = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
     noted = notes.of_vessel(warehouse, vessel, as_of)
-    return _Logs(past, segments, noted, code_of(warehouse, "estimate"), as_of is not None)
+    twins = _twins(warehouse, vessel) if as_of is None and segments else {}
+    return _Logs(past, segments, twins, noted, code_of(warehouse, "estimate"), as_of is not None)
+
+
+def _twins(warehouse: Warehouse, vessel: str) -> dict[str, str]:
+    from kempf.warehouse import segments
+    from kempf.warehouse.deduplicate import twins
+
+    return twins(segments.current(warehouse, vessel))
 
 
 def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:
@@ -356,8 +369,9 @@ def _marked(table: DeltaTable | None, vessel: str, logs: _Logs, columns: Sequenc
 
     A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
     longer, and where there are sets of newer code: of the present code, else of the one that was at work last; where
-    this is so of a set that it brings forward; and where a pooled set of the same model and settings
-    rests on all of its manoeuvres and more. A set that goes by noted draughts is superseded where others are noted now.
+    this is so of a set that it brings forward; and where a pooled set of the same model and settings rests on all of
+    its manoeuvres and more, or on the same ones as a log holds them that has more of them. A set that goes by noted
+    draughts is superseded where others are noted now.
     """
     import polars as pl
 
@@ -384,7 +398,7 @@ def _marked(table: DeltaTable | None, vessel: str, logs: _Logs, columns: Sequenc
     ]
     old |= pl.Series(noted, dtype=pl.Boolean)
     sets = sets.with_columns(superseded=old).drop("_code", "_at")
-    marked = sets.with_columns(superseded=_with_chains(sets)).drop(extra)
+    marked = sets.with_columns(superseded=_with_chains(sets, logs.twins)).drop(extra)
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
 
 
@@ -404,7 +418,7 @@ def _noted_otherwise(inputs: dict[str, Any], among: Sequence[Note]) -> bool:
     return bool(held) and notes.draughts_m(among, [Bounds(**segment) for segment in inputs["segments"]]) != held
 
 
-def _with_chains(sets: pl.DataFrame) -> pl.Series:
+def _with_chains(sets: pl.DataFrame, doubles: Mapping[str, str]) -> pl.Series:
     """Return which sets are superseded: those that rest on such ones, and pooled ones that another one contains."""
     import polars as pl
 
@@ -414,7 +428,7 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
     # nearly all of a vessel's sets have the settings of another one
     parts = cache(_parts)
-    known = {row["parameter_set_id"]: _Rests(row, *parts(row["settings_json"])) for row in rows}
+    known = {row["parameter_set_id"]: _Rests(row, *parts(row["settings_json"]), doubles) for row in rows}
     for basis in sorted(known.values(), key=lambda basis: basis.update.manoeuvres if basis.update else 0):
         if basis.update is not None:
             # it rests on fewer manoeuvres, so that what that one rests on is known
@@ -445,9 +459,15 @@ def _parts(settings_json: str) -> tuple[Update | None, str]:
 class _Rests:
     """What a set rests on, and whether anything of it is superseded."""
 
-    def __init__(self, row: Mapping[str, Any], update: Update | None, settings_text: str) -> None:
+    def __init__(
+        self, row: Mapping[str, Any], update: Update | None, settings_text: str, doubles: Mapping[str, str]
+    ) -> None:
         self.update = update
-        self.segments = frozenset(row["segment_ids"])
+        names = row["segment_ids"]
+        #: Each as the log holds it that has most of it.
+        self.segments = frozenset(doubles.get(name, name) for name in names)
+        #: How many it takes from a log that has less of them.
+        self.in_part = sum(name in doubles for name in names)
         self.superseded: bool = row["superseded"]
         self.converged: bool = row["converged"]
         #: Whether it goes by draughts that were noted.
@@ -458,22 +478,24 @@ class _Rests:
     def on(self, before: _Rests | None) -> None:
         """Rest on another one, too; None where that is lost."""
         self.superseded = self.superseded or before is None or before.superseded
-        self.segments |= before.segments if before is not None else frozenset()
+        if before is not None:
+            self.segments |= before.segments
+            self.in_part += before.in_part
 
     @property
     def pooled(self) -> bool:
         return len(self.segments) > 1
 
     def replaces(self, other: _Rests) -> bool:
-        """Whether it is of more manoeuvres, or of the same ones and by draughts, or with more fitted at once."""
+        """Whether it is of more manoeuvres, or of the same ones and by draughts, as whole, or more fitted at once."""
         if self.segments != other.segments:
             return self.segments > other.segments
         return self._rank < other._rank
 
     @property
-    def _rank(self) -> tuple[bool, int, str]:
+    def _rank(self) -> tuple[bool, int, int, str]:
         at_once = self.update.fitted_at_once if self.update else len(self.segments)
-        return not self.noted, -at_once, self._id
+        return not self.noted, self.in_part, -at_once, self._id
 
 
 def _only(frame: pl.DataFrame, parameter: str) -> pl.DataFrame:

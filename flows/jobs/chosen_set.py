@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from kempf.flows.jobs.withdrawn_set import why_withdrawn
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import aliases, parameter_sets, vessels
 from kempf.warehouse.parameter_set import ParameterSet
@@ -29,11 +30,11 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     if alias in pointed:
         return parameter_sets.get(warehouse, pointed[alias], vessel), alias
     if name is None and aliases.WITHDRAWN in pointed:
+        why, commands = why_withdrawn(warehouse, vessel, pointed[aliases.WITHDRAWN])
         raise NotFound(
             "no_parameter_set",
-            f"No parameter set of {vessel!r} is current: what {pointed[aliases.WITHDRAWN]} rests on was corrected or "
-            "removed.",
-            f"Bring its model up to date with `kempf reprocess --vessel {vessel!r}`.",
+            f"No parameter set of {vessel!r} is current: {why}.",
+            f"Bring its model up to date: {', '.join(f'`{command}`' for command in commands)}.",
             {"vessel": vessel, "withdrawn": pointed[aliases.WITHDRAWN]},
         )
     if name is None:

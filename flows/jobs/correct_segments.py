@@ -46,6 +46,8 @@ class Planned:
         # first what was said: where it ends here, the next reprocessing looks through the log again, and the same
         # command goes on
         before = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
+        if self.correction.action == "correct" and self.before is not None and self._was_excluded(before):
+            raise _excluded(self.before)
         if _with(before, self.correction) != before:
             corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
         # before the manoeuvres: once they are otherwise it is not seen any more what rested on them
@@ -55,6 +57,11 @@ class Planned:
         now = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
         searched = self._searched if now == self._said else search_again(warehouse, self.log, now)
         search_log.store(warehouse, [searched])
+
+    def _was_excluded(self, now: Sequence[Correction]) -> bool:
+        """Return whether another person excluded the manoeuvre since this was planned."""
+        mine = [said for said in now if said.subject_utc_ns == self.correction.subject_utc_ns]
+        return bool(mine) and mine[-1].action == "exclude"
 
     @property
     def doubts(self) -> tuple[str, ...]:
@@ -102,8 +109,8 @@ def plan_for(
     NotFound
         ``no_warehouse``, ``no_segment``; ``manoeuvre_gone``: the present code finds nothing there.
     UsageError
-        ``ambiguous_segment``, ``no_reason``, ``nothing_to_correct``, ``not_a_zigzag``, ``bounds_reversed``,
-        ``bounds_outside_log``, ``bounds_overlap``.
+        ``ambiguous_segment``, ``no_reason``, ``nothing_to_correct``, ``not_a_zigzag``, ``segment_excluded``,
+        ``bounds_reversed``, ``bounds_outside_log``, ``bounds_overlap``.
     DataRejected
         ``no_legs``: between these bounds is no zigzag.
     """
@@ -118,6 +125,8 @@ def plan_for(
             "Exclude it with `kempf segments exclude`, or add a zigzag with `kempf segments add`.",
             {"segment_id": segment.segment_id, "kind": segment.kind},
         )
+    if action == "correct" and segment.excluded is not None:
+        raise _excluded(segment)
     last = by_hand["action"] if by_hand else None
     same_again = action == last and (action != "correct" or bounds_utc_ns == (segment.start_utc_ns, segment.end_utc_ns))
     if same_again and _is_looked_through(warehouse, log, segment):
@@ -173,6 +182,16 @@ def _is_looked_through(warehouse: Warehouse, log: LogRow, segment: Segment) -> b
     examination = examinations.of_ingests(warehouse, [log.ingest_id], [log.vessel]).get(log.ingest_id)
     return examination is not None and examination.code_version == corrections.basis(
         segment.code_version, log_corrections
+    )
+
+
+def _excluded(segment: Segment) -> UsageError:
+    why = f" ({segment.excluded})" if segment.excluded else ""
+    return UsageError(
+        "segment_excluded",
+        f"{segment.segment_id} is excluded{why}; other bounds would let it count again.",
+        "If it shall count, take the exclusion back first with `kempf segments accept`.",
+        {"segment_id": segment.segment_id},
     )
 
 

@@ -9,6 +9,7 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
+from kempf.flows.jobs.withdrawn_set import why_withdrawn
 from kempf.schemas.enumeration import counted
 from kempf.warehouse import aliases, corrections, examinations, history, logs, parameter_sets, vessels
 from kempf.warehouse.equivalents import code_of
@@ -75,15 +76,17 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     said = [f"{' and '.join(parts)} {_OLDER}"] if parts else []
     pointed = aliases.of_vessel(warehouse, vessel)
     current, withdrawn = pointed.get(aliases.CURRENT), pointed.get(aliases.WITHDRAWN)
+    commands = [command_for([vessel])]
     if current is None and withdrawn is not None:
-        said.append(f"no parameter set is current, since what {withdrawn} rests on was corrected or removed")
+        why, commands = why_withdrawn(warehouse, vessel, withdrawn)
+        said.append(f"no parameter set is current, since {why}")
     # of other code every set is superseded, which is said already
     elif current is not None and not old and current not in history.standing(warehouse, vessel):
         said.append(
             f"the current parameter set {current} is superseded: her logs, her manoeuvres or the code have changed "
             "since it was made"
         )
-    return f"{vessel}: {'; '.join(said)}; next: {command_for([vessel])}" if said else None
+    return f"{vessel}: {'; '.join(said)}; next: {', '.join(commands)}" if said else None
 
 
 def said_of_sets(warehouse: Warehouse, sets: Iterable[ParameterSet]) -> str | None:

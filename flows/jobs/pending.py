@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from kempf.flows.jobs.standing_model import stored_anywhere
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
@@ -38,37 +39,32 @@ class Waiting:
             sets, self.sets = self.sets, []
             parameter_sets.insert(self._warehouse, sets)
 
-    def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
-        """Return the set that an alias points to, or will, as it is stored; None where that set is lost."""
-        stored = aliases.of_vessel(self._warehouse, self._vessel).get(alias)
-        name = self.aliases.get((self._vessel, alias), stored)
-        if name is None:
-            return None
-        new_set = next((parameter_set for parameter_set in self.sets if parameter_set.parameter_set_id == name), None)
-        if new_set is not None:
-            return new_set
-        try:
-            return parameter_sets.as_stored(self._warehouse, name, self._vessel)
-        except NotFound:
-            # taken out by a repair, with the file that held it
-            return None
-
     def may_move(self, spec: ModelSpec, *, adopt: bool) -> bool:
         """Return whether ``current`` may go to a set of this model: from a model with effects only to the like.
+
+        The model of a set that was withdrawn counts as hers: it is brought up to date, and is current then.
 
         Parameters
         ----------
         adopt : bool
             Whether it may leave another model.
         """
-        standing = self.standing()
-        if standing is None and not adopt:
-            # the model of a set that was withdrawn is brought up to date, and is current then
-            standing = self.standing(aliases.WITHDRAWN)
-        if standing is None:
+        pointed = aliases.of_vessel(self._warehouse, self._vessel)
+        name = self.aliases.get((self._vessel, aliases.CURRENT)) or aliases.of_model(pointed)
+        if name is None:
             return True
+        try:
+            standing = self._standing(name)
+        except NotFound:
+            # its file was lost: which model it was nobody knows, so that only a person may put one in its place
+            return adopt
         now = ModelSpec.model_validate(dict(standing.model_spec))
         return now == spec or (adopt and (bool(spec.effects) or not now.effects))
+
+    def _standing(self, name: str) -> ParameterSet:
+        """Return a set that waits or is stored, as it is stored."""
+        new_set = next((parameter_set for parameter_set in self.sets if parameter_set.parameter_set_id == name), None)
+        return new_set or stored_anywhere(self._warehouse, name, self._vessel)
 
     def point(self, parameter_set_id: str, alias: str = aliases.CURRENT) -> None:
         """Let an alias point to one of her sets, once that is stored."""

@@ -234,6 +234,9 @@ class _Reprocessing:
         if work.report.segments and self.request is None:
             self._model(work)
         _withdraw(self.warehouse, work.vessel, work.report)
+        now = aliases.of_vessel(self.warehouse, work.vessel).get(aliases.CURRENT)
+        if work.before is not None and now != dict(work.before.aliases).get(aliases.CURRENT):
+            work.report.current = now
         work.report.findings = [finding.as_json() for finding in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
@@ -241,7 +244,7 @@ class _Reprocessing:
         try:
             now = standing_or_withdrawn(self.warehouse, work.vessel)
         except NotFound:
-            # the set is lost: `_withdraw` says so
+            work.report.fail(aliases.CURRENT, _model_lost(self.warehouse, work.vessel))
             return
         if now is None:
             return
@@ -299,6 +302,18 @@ def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
     if pointed not in history.standing(warehouse, vessel):
         aliases.withdraw(warehouse, vessel)
         report.withdrawn = pointed
+
+
+def _model_lost(warehouse: Warehouse, vessel: str) -> KempfError:
+    name = aliases.of_model(aliases.of_vessel(warehouse, vessel))
+    return NotFound(
+        "model_lost",
+        f"The current parameter set of {vessel!r}, {name}, is not in the warehouse any more, and which effects its "
+        "model had is not known without it.",
+        f"Choose another set with `kempf params alias current ID --vessel {vessel!r}`, or make the plain model current "
+        f"with `kempf identify --vessel {vessel!r}` and add its effects with `kempf effects add`.",
+        {"vessel": vessel, "parameter_set_id": name},
+    )
 
 
 def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -11,6 +11,7 @@ from types import EllipsisType
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.schemas import effects
 from kempf.schemas.effect import Effect
@@ -182,12 +183,25 @@ def current_effects(warehouse: Warehouse, only: str | None = None) -> dict[str, 
 
 def standing_or_withdrawn(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model or, where it was withdrawn and none came after it, that one; else None."""
-    pointed = aliases.of_vessel(warehouse, vessel)
-    return _model_at(warehouse, vessel, pointed.get(aliases.CURRENT) or pointed.get(aliases.WITHDRAWN))
+    return _model_at(warehouse, vessel, aliases.of_model(aliases.of_vessel(warehouse, vessel)))
+
+
+def stored_anywhere(warehouse: Warehouse, name: str, vessel: str) -> ParameterSet:
+    """Return a set by its whole id as it is stored: of a vessel or, where she was renamed since, of her earlier name.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``: it is lost.
+    """
+    stored = parameter_sets.all_as_stored(warehouse, vessel, [name])
+    return stored[0] if stored else parameter_sets.as_stored(warehouse, name)
 
 
 def _model_at(warehouse: Warehouse, vessel: str, name: str | None) -> ParameterSet | None:
-    stored = parameter_sets.get(warehouse, name, vessel) if name else None
+    stored = stored_anywhere(warehouse, name, vessel) if name else None
+    if stored is not None and stored.updates is not None:
+        stored = parameter_sets.get(warehouse, stored.parameter_set_id, stored.vessel)
     return stored if stored is not None and stored.estimator in (POOLED, WITH_EFFECTS) else None
 
 
@@ -197,8 +211,8 @@ def model_of(stored: ParameterSet) -> tuple[ModelSpec, Own]:
 
 
 def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
-    """Return a vessel's current model, the plain one or that of her surroundings where she has none yet."""
-    now = standing(warehouse, vessel)
+    """Return a vessel's model, also where its set was withdrawn; the one of her surroundings where she has none yet."""
+    now = standing_or_withdrawn(warehouse, vessel)
     return model_of(now) if now else (default_model_of(warehouse, vessel), Own())
 
 
@@ -213,13 +227,15 @@ def undo(warehouse: Warehouse, vessel: str, shown: str | None = None) -> Paramet
     Raises
     ------
     NotFound
-        ``no_vessel``, ``no_parent``.
+        ``no_vessel``, ``no_parent``; ``no_parameter_set``: her current one was withdrawn.
     UsageError
         ``moved_meanwhile``.
     """
     vessels.require(warehouse, vessel)
     require_current(warehouse, vessel, shown)
     now = standing(warehouse, vessel)
+    if now is None and aliases.WITHDRAWN in aliases.of_vessel(warehouse, vessel):
+        chosen_set(warehouse, vessel)  # says what was withdrawn, and what brings it back
     if now is None or now.parent is None:
         raise NotFound(
             "no_parent",

@@ -33,6 +33,8 @@ class VesselReport:
     verified: dict[str, int] = field(default_factory=dict)
     #: Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
     withdrawn: str | None = None
+    #: Parameter set that ``current`` points to now, where it pointed to another one, or to none, before.
+    current: str | None = None
     #: What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
     #: refused, so that the same data are refused again; ``known`` that the run before reported it already.
     failures: list[dict[str, Any]] = field(default_factory=list)
@@ -44,7 +46,8 @@ class VesselReport:
         """``failed`` where something did, else ``changed`` or ``unchanged``."""
         if self.failures:
             return "failed"
-        return "changed" if self.reread or self.searched or self.new_sets else "unchanged"
+        changed = self.reread or self.searched or self.new_sets or self.current or self.withdrawn
+        return "changed" if changed else "unchanged"
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as JSON content."""

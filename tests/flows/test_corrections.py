@@ -65,6 +65,10 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     assert plan(warehouse, None, changed_only=True).due
     with pytest.raises(UsageError, match="excluded already"):
         plan_for(warehouse, zigzag.segment_id, "exclude", "again")
+    other = zigzag.start_utc_ns + 7 * SECOND_NS, zigzag.end_utc_ns
+    with pytest.raises(UsageError, match="is excluded \\(the engine was slowed down\\)") as refused:
+        plan_for(warehouse, zigzag.segment_id, "correct", "a better begin", other)
+    assert refused.value.code == "segment_excluded"
     # the sets of the time before are there, and one is built again bit for bit
     assert rerun(warehouse, before[0]).verdict == "bit-identical"
     plan_for(warehouse, zigzag.segment_id, "accept", "it was not").store(warehouse)
@@ -72,7 +76,12 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     assert back.segment_id == zigzag.segment_id and back.detail["by_hand"]["action"] == "accept"
     reprocess_vessel(warehouse, "mariner")
     assert history.standing(warehouse, "mariner") == before
-    assert [one.correction.action for one in corrections.all_of(warehouse)] == ["exclude", "accept"]
+    # two people at once: what the one excluded meanwhile is not let count again by the other's bounds
+    late = plan_for(warehouse, zigzag.segment_id, "correct", "a better begin", other)
+    plan_for(warehouse, zigzag.segment_id, "exclude", "tugs alongside").store(warehouse)
+    with pytest.raises(UsageError, match="is excluded"):
+        late.store(warehouse)
+    assert [one.correction.action for one in corrections.all_of(warehouse)] == ["exclude", "accept", "exclude"]
 
 
 def test_a_model_keeps_its_effects_without_a_manoeuvre_and_with_it_again(late_added: Path, tmp_path: Path) -> None:

@@ -115,8 +115,9 @@ def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | Non
 
     try:
         current, _ = chosen_set(warehouse, vessel)
-    except NotFound:
-        click.echo(f"current of {vessel}: no set; none of them converged")
+    except NotFound as error:
+        withdrawn = "withdrawn" in error.details
+        click.echo(f"current of {vessel}: {error if withdrawn else 'no set; none of them converged'}")
         return
     name, model = current.parameter_set_id, current.model_name
     basis = "pooled" if len(current.segment_ids) > 1 else "one manoeuvre"

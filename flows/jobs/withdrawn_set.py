@@ -1,0 +1,25 @@
+"""Why a vessel has no current set though she had one, in words, and what helps."""
+
+from __future__ import annotations
+
+import shlex
+
+from kempf.warehouse import segments
+from kempf.warehouse.store import Warehouse
+
+
+def why_withdrawn(warehouse: Warehouse, vessel: str, withdrawn: str) -> tuple[str, list[str]]:
+    """Return why no set of a vessel is current, a phrase, and the commands that help.
+
+    Parameters
+    ----------
+    withdrawn : str
+        Id of the set that was current.
+    """
+    name = shlex.quote(vessel)
+    if any(segment.is_fitted for segment in segments.found_in(warehouse, vessel)):
+        return f"what {withdrawn} rests on was corrected or removed", [f"kempf reprocess --vessel {name}"]
+    return (
+        "in her logs, as they are read now, no manoeuvre is found that a model is fitted to",
+        [f"kempf segments --vessel {name}", "kempf doctor LOG", f"kempf vessels set {name} --profile FILE"],
+    )
