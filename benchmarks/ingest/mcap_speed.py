@@ -25,7 +25,7 @@ LARGE_BYTES = 1_000_000_000
 def ours(path: Path) -> int:
     """Decode every message to canonical channels, a few megabytes at a time."""
     from kempf.pipeline.ingest.log_file import LogFile
-    from kempf.pipeline.ingest.mcap import decode as mcap_log
+    from kempf.pipeline.ingest.mcap.decode import decode
     from kempf.schemas.profile import Source
 
     count = values = 0
@@ -36,9 +36,9 @@ def ours(path: Path) -> int:
             topics = {topic for topic, *_ in (*JSON_TOPICS, IMU_TOPIC)}
         mapped = {key: one for key, one in CHANNELS.items() if key.split(".")[0] in topics}
         source = Source.model_validate({"match": "*", "channels": mapped})
-        for part in mcap_log.parts(path.name, log, source):
-            count += part.time_ns.size
-            values += sum(value.size for found in part.values.values() for _, value in found)
+        for decoded in decode(path.name, log, source, ["*"]):
+            count += len(decoded)
+            values += sum(int(channel.present.sum()) for channel in decoded.channels.values())
     assert values == count, "every message gives a value"
     return count
 

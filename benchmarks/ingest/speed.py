@@ -12,6 +12,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -89,17 +90,29 @@ class Stopwatch:
             self.seconds += perf_counter() - begin
 
 
+class TimedReading(Stopwatch):
+    """Does as `Stopwatch` for a function that lends what was read until the end of a ``with``."""
+
+    @contextmanager
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        begin = perf_counter()
+        with self.function(*arguments, **named) as readings:
+            self.seconds += perf_counter() - begin
+            yield readings
+
+
 def job(log: Path, profile_path: Path, folder: Path) -> dict[str, float]:
     """Time the main job on one log, in this process, s; storing is what reading and segmenting leave of the ingest."""
     from kempf.flows.jobs import ingest_logs
     from kempf.flows.jobs.files import read_profiles
     from kempf.flows.jobs.identify_vessel import identify_vessel
+    from kempf.pipeline.ingest.read import read_parts
     from kempf.warehouse.store import Warehouse
 
     profile = read_profiles([profile_path])
     stages = vars(ingest_logs)
-    read, segment = Stopwatch(stages["read_log"]), Stopwatch(stages["find_segments"])
-    stages.update(read_log=read, find_segments=segment)
+    read, segment = TimedReading(stages["spooled"]), Stopwatch(stages["search"])
+    stages.update(spooled=read, search=segment)
     warehouse = Warehouse(str(folder))
     begin, worked = perf_counter(), process_time()
     taken = ingest_logs.ingest(warehouse, [log], None, profile)[0]
@@ -108,7 +121,8 @@ def job(log: Path, profile_path: Path, folder: Path) -> dict[str, float]:
     end, worked = perf_counter(), process_time() - worked
     data = log.read_bytes()
     again = perf_counter()
-    read.function(log.name, data, profile)
+    for _ in read_parts(log.name, data, profile):
+        pass
     again = perf_counter() - again
     if taken.tally is None:
         raise RuntimeError(f"{log.name} was not taken in: {taken.error}")
