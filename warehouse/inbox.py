@@ -1,4 +1,4 @@
-"""What became of the files of inboxes: ingested, in quarantine, or dismissed. A file has one row, its latest."""
+"""What became of the files of inboxes. A file has one row, its latest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from kempf.warehouse.keys import one_of
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
-Outcome = Literal["ingested", "quarantined", "dismissed"]
+#: ``dismissed`` by a person; ``gone`` from the inbox while in quarantine, and tried again when it returns; ``removed``:
+#: a log that a person removed, which is left alone
+Outcome = Literal["ingested", "quarantined", "dismissed", "gone", "removed"]
+#: what is stored of a file that is gone; earlier versions stored it as dismissed
+NO_LONGER_THERE = "It is no longer in the inbox."
 
 
 @dataclass(frozen=True)
@@ -27,11 +31,11 @@ class InboxFile:
     outcome: Outcome
     #: None where it could not be placed.
     vessel: str | None = None
-    #: None where it is not ingested.
+    #: None where it is neither ingested nor a removed log.
     log_id: str | None = None
     #: Of the error that quarantined it.
     code: str | None = None
-    #: Why it is quarantined or dismissed, and what to do.
+    #: Why it is not ingested, and what to do.
     message: str | None = None
     next_step: str | None = None
     #: Hash of vessel, profile and code that it was tried with.
@@ -49,7 +53,13 @@ def below(warehouse: Warehouse, root: str) -> dict[str, InboxFile]:
     if not warehouse.exists():
         return {}
     rows = delta.read(warehouse, "inbox").rows(named=True)
-    return {row["address"]: InboxFile(**row) for row in rows if row["address"].startswith(f"{root}/")}
+    return {row["address"]: _file(row) for row in rows if row["address"].startswith(f"{root}/")}
+
+
+def _file(row: dict[str, Any]) -> InboxFile:
+    if row["outcome"] == "dismissed" and row["message"] == NO_LONGER_THERE:
+        row = {**row, "outcome": "gone"}
+    return InboxFile(**row)
 
 
 def quarantined(warehouse: Warehouse) -> list[InboxFile]:

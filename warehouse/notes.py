@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, Protocol
@@ -12,6 +13,9 @@ from kempf.schemas.instants import iso_utc
 from kempf.warehouse import append_only, delta
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
+
+#: how the text of a note ends that was carried to another vessel
+_CARRIED = re.compile(r", note ([0-9]+)\]$")
 
 Subject = Literal["vessel", "log", "segment", "set"]
 
@@ -146,7 +150,7 @@ def carry(
 ) -> None:
     """Write the notes on a vessel, a log or a manoeuvre again for the vessel that takes her place; the old ones stay.
 
-    What is written again already is left out, so that an interrupted move goes on.
+    What she has already is left out, so that an interrupted move goes on and one there and back adds nothing.
 
     Parameters
     ----------
@@ -158,12 +162,38 @@ def carry(
         Whose they are to be.
     """
     new_id = to if subject == "vessel" else subject_id
-    there = {note.text for note in of_vessel(warehouse, to) if (note.subject, note.subject_id) == (subject, new_id)}
-    for note in of_vessel(warehouse, vessel):
-        if (note.subject, note.subject_id) == (subject, subject_id):
-            text = f"{note.text} [{vessel}, note {note.number}]"
-            if text not in there:
-                add(warehouse, to, subject, new_id, text, event_utc_ns=note.event_utc_ns, draught_m=note.draught_m)
+    by_number = {note.number: note for note in of_vessel(warehouse)}
+    there = {
+        origin(by_number, note).number
+        for note in by_number.values()
+        if (note.vessel, note.subject, note.subject_id) == (to, subject, new_id)
+    }
+    for note in by_number.values():
+        first = origin(by_number, note)
+        if (note.vessel, note.subject, note.subject_id) == (vessel, subject, subject_id) and first.number not in there:
+            there.add(first.number)
+            event, draught_m = note.event_utc_ns, note.draught_m
+            add(warehouse, to, subject, new_id, _carried(first), event_utc_ns=event, draught_m=draught_m)
+
+
+def origin(by_number: Mapping[int, Note], note: Note) -> Note:
+    """Return the note that a person wrote, of one that was carried to another vessel; any other is its own.
+
+    Parameters
+    ----------
+    by_number : mapping of int to Note
+        The notes of all vessels.
+    """
+    carried = _CARRIED.search(note.text)
+    before = by_number.get(int(carried[1])) if carried else None
+    if before is None or before.number >= note.number:
+        return note
+    is_its = note.subject == before.subject and note.text == _carried(before)
+    return origin(by_number, before) if is_its else note
+
+
+def _carried(note: Note) -> str:
+    return f"{note.text} [{note.vessel}, note {note.number}]"
 
 
 def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, float]:

@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse import object_store
+from kempf.warehouse.folder_walk import walk
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,20 @@ class SourceFile:
     def folder(self) -> str:
         """First folder of its path; blank where it lies at the top."""
         return self.path.partition("/")[0] if "/" in self.path else ""
+
+
+@dataclass(frozen=True)
+class Listing:
+    """What lies in a folder that logs arrive in."""
+
+    #: Sorted by path; hidden ones are left out.
+    files: tuple[SourceFile, ...]
+    #: Paths of links that lead nowhere, such as onto a share that is not mounted.
+    dangling: tuple[str, ...] = ()
+    #: Paths at which a folder was not entered, as it is listed under another path already.
+    not_entered: tuple[str, ...] = ()
+    #: Paths whose names are no text, with escapes.
+    misnamed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -91,8 +106,8 @@ class SourceFolder:
             ) from error
         return files, str(root)
 
-    def list(self) -> list[SourceFile]:
-        """Return its files, those in folders below it too, sorted by path; hidden ones are left out.
+    def list(self) -> Listing:
+        """Return its files, those in folders below it too; no folder is entered twice, whatever links lead to it.
 
         Raises
         ------
@@ -122,6 +137,8 @@ class SourceFolder:
                     "Check the address; an inbox is a folder, or s3://bucket/prefix, with one folder a vessel.",
                     {"uri": self.uri},
                 )
+            if "://" not in self.address:
+                return self._walked()
             listing = files.get_file_info(fs.FileSelector(root, recursive=True))
         except OSError as error:
             raise KempfError(
@@ -136,7 +153,19 @@ class SourceFolder:
             if info.type != fs.FileType.File or any(part.startswith(".") for part in path.split("/")):
                 continue
             listed.append(SourceFile(f"{self.address}/{path}", path, info.size or 0, info.mtime_ns or 0))
-        return sorted(listed, key=lambda file: file.path)
+        return Listing(tuple(sorted(listed, key=lambda file: file.path)))
+
+    def _walked(self) -> Listing:
+        """Return what lies in a folder of this machine."""
+        walked = walk(Path(self.address))
+        files = (
+            SourceFile(f"{self.address}/{path}", path, status.st_size, status.st_mtime_ns)
+            for path, status in sorted(walked.files.items())
+        )
+        return Listing(
+            tuple(files),
+            *(tuple(sorted(paths)) for paths in (walked.dangling, walked.not_entered, walked.misnamed)),
+        )
 
     def file(self, path: str) -> SourceFile:
         """Return one of its files.

@@ -119,12 +119,38 @@ def remove(warehouse: Warehouse, vessel: str, reason: str) -> bool:
     return with_retry(attempt)
 
 
+def bring_back(warehouse: Warehouse, vessel: str) -> bool:
+    """Let a vessel that was removed count again, with the profile that was her last.
+
+    Returns
+    -------
+    bool
+        Whether she had been removed; else nothing changes.
+    """
+    if vessel not in removed(warehouse):
+        return False
+    last = [version for version in all_versions(warehouse) if version.vessel == vessel][-1]
+    return register(warehouse, vessel, last.profile)
+
+
 def _last_rows(warehouse: Warehouse, where: Where, columns: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
     """Return the last row of every vessel that was not removed, by name, sorted."""
+    last = _every_last_row(warehouse, where, columns)
+    return {vessel: row for vessel, row in last.items() if row["removed"] is None}
+
+
+def _every_last_row(warehouse: Warehouse, where: Where, columns: Sequence[str]) -> dict[str, dict[str, Any]]:
     wanted = (*columns, "vessel", "revision", "removed") if columns else ()
     rows = delta.read(warehouse, "vessels", where, wanted).sort("vessel", "revision").rows(named=True)
-    last = {row["vessel"]: row for row in rows}
-    return {vessel: row for vessel, row in last.items() if row["removed"] is None}
+    return {row["vessel"]: row for row in rows}
+
+
+def removed(warehouse: Warehouse) -> dict[str, str]:
+    """Return why each vessel that counts no longer was removed, by name, sorted; none where there is no warehouse."""
+    if not warehouse.exists():
+        return {}
+    last = _every_last_row(warehouse, {}, ("vessel_key",))
+    return {vessel: row["removed"] for vessel, row in last.items() if row["removed"] is not None}
 
 
 def names(warehouse: Warehouse) -> list[str]:

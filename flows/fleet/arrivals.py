@@ -45,10 +45,10 @@ def sentence(outcomes: Sequence[dict[str, Any]]) -> str:
     return f"{counted(len(outcomes), 'log')}: {tally}" if outcomes else "no log is new"
 
 
-def in_quarantine(file: InboxFile) -> dict[str, Any]:
-    """Return a file in quarantine as the outcome of a log."""
+def not_ingested(file: InboxFile) -> dict[str, Any]:
+    """Return a file that was not ingested, as it is in quarantine or was removed, as the outcome of a log."""
     error = {"code": file.code, "message": file.message, "next_step": file.next_step}
-    return {"path": file.address, "outcome": "quarantined", "segments": [], "records": None, "error": error}
+    return {"path": file.address, "outcome": file.outcome, "segments": [], "records": None, "error": error}
 
 
 def table(outcomes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

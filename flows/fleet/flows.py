@@ -71,6 +71,10 @@ def inbox_task(warehouse: str, folder: str) -> InboxRun:
     )
     for file in run.quarantined:
         log.warning("quarantined: %s: %s %s", file.address, file.message, file.next_step)
+    for file in run.removed:
+        log.warning("removed before: %s: %s %s", file.address, file.message, file.next_step)
+    for remark in run.remarks:
+        log.warning("%s: %s", run.address, remark)
     return run
 
 
@@ -100,12 +104,14 @@ def ingest(
     if vessel is None and not profiles:
         runs = [inbox_task(warehouse, folder) for folder in paths]
         outcomes = [outcome.as_json() for run in runs for outcome in run.ingested]
-        _show_logs(outcomes + [arrivals.in_quarantine(file) for run in runs for file in run.quarantined])
+        others = [file for run in runs for file in (*run.removed, *run.quarantined)]
+        _show_logs(outcomes + [arrivals.not_ingested(file) for file in others])
         waiting = [run for run in runs if run.quarantined]
         if waiting:
             errors = [NeedsAPerson(run) for run in waiting]
             return Failed(message=" ".join(error.message for error in errors), data=errors[0])
-        return Completed(message=arrivals.sentence(outcomes), data=outcomes)
+        said = [arrivals.sentence(outcomes), *(remark for run in runs for remark in run.remarks)]
+        return Completed(message=". ".join(said), data=outcomes)
     outcomes = ingest_batch(warehouse, paths, vessel, list(profiles))
     _show_logs(outcomes)
     failed = [outcome for outcome in outcomes if "error" in outcome]

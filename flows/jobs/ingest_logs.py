@@ -6,11 +6,13 @@ import logging
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from kempf.flows.jobs import search_log, split_logs
 from kempf.flows.jobs.files import opened_log
 from kempf.flows.jobs.find_segments import Ingest
+from kempf.flows.jobs.former_vessel import former_vessels
 from kempf.flows.jobs.inbox_place import no_vessel
 from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.search_log import SearchedLog, search
@@ -60,6 +62,8 @@ class IngestOutcome:
     lost: tuple[LostStretch, ...] = ()
     #: What the channel doctor found in it.
     examination: StoredExamination | None = None
+    #: Why a person had removed the log that now counts again; None where nobody had.
+    was_removed: str | None = None
     #: Why it failed; then nothing of the log was stored.
     error: KempfError | None = None
 
@@ -79,6 +83,7 @@ class IngestOutcome:
             "segments": [segment.segment_id for segment in self.segments],
             "other_manoeuvres": [{"segment_id": s.segment_id, "kind": s.kind} for s in self.others],
             "channels": _channels(self.examination),
+            "was_removed": self.was_removed,
             **(self.error.as_json() if self.error else {}),
         }
 
@@ -113,7 +118,7 @@ def settle_vessel(
         ``no_vessel_named``, ``vessel_name``: the name is blank, or ``profiles_disagree``: the option and the profile
         name different vessels.
     NotFound
-        ``no_vessel``.
+        ``no_vessel``, ``vessel_renamed``.
     """
     named = given.vessel if given else None
     if vessel is not None and named is not None and vessel != named:
@@ -133,6 +138,12 @@ def settle_vessel(
     vessel_key(name)  # refuses a name that is none once, not for every log
     known = vessels.profiles(warehouse)
     if known and name not in known and given is None and not new_vessel:
+        former = former_vessels(warehouse).get(name)
+        if former is not None and former.now is not None:
+            raise former.refused(
+                f"The vessel {name!r} {former.words}.",
+                f"Give --vessel {quote(former.now)}; if another ship has the old name now, say so with --new-vessel.",
+            )
         raise no_vessel(
             name,
             known,
@@ -221,6 +232,7 @@ def ingest_log(
         stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
         examination = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel])[row.ingest_id]
         return _outcome(warehouse, path, "unchanged", row, stored_segments, examination)
+    before = logs.find(warehouse, [log.sha256]).get(log.sha256)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
         corrections_by_log = corrections.of_logs(warehouse, [log.sha256])
@@ -228,7 +240,8 @@ def ingest_log(
         give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    return _outcome(warehouse, path, stored.outcome, row, read.found.segments, read.found.examination)
+    outcome = _outcome(warehouse, path, stored.outcome, row, read.found.segments, read.found.examination)
+    return replace(outcome, was_removed=before.removed if before else None)
 
 
 def _outcome(

@@ -52,8 +52,16 @@ def what_goes(warehouse: Warehouse, name: str, reason: str) -> Purge:
     )
 
 
+def is_done(warehouse: Warehouse, log_id: str) -> bool:
+    """Return whether a log was deleted for good, and nothing of it is left that another purge would delete."""
+    if log_id not in purges.of_logs(warehouse, [log_id]) or raw.left_of(warehouse, log_id):
+        return False
+    ingests = _ingests(warehouse, held_or_removed(warehouse, log_id))
+    return not any(_rows(warehouse, table, "ingest_id", ingests) for table in _OF_INGESTS)
+
+
 def purge(warehouse: Warehouse, name: str, reason: str) -> Purge:
-    """Delete a log for good; one that was interrupted goes on.
+    """Delete a log for good; one that was interrupted goes on, and one that is done changes nothing.
 
     Parameters
     ----------
@@ -73,6 +81,8 @@ def purge(warehouse: Warehouse, name: str, reason: str) -> Purge:
         ``ambiguous_log``, ``no_reason``.
     """
     receipt = what_goes(warehouse, name, reason)
+    if is_done(warehouse, receipt.log_id):
+        return receipt
     row = held_or_removed(warehouse, receipt.log_id)
     if row.removed is None:
         remove(warehouse, [row], f"purged: {reason}")

@@ -49,7 +49,7 @@ def release(
     settled, profile = settle_vessel(warehouse, whose, given, new_vessel=new_vessel)
     parent, _, path = held.address.rpartition("/")
     folder = SourceFolder(parent, warehouse.storage_options)
-    row, outcome = take(warehouse, folder, Placed(folder.file(path), settled, profile))
+    row, outcome = take(warehouse, folder, Placed(folder.file(path), settled, profile), by_hand=True)
     inbox.record(warehouse, [row])
     if outcome is None:
         raise _still_in(row)

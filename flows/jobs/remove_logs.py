@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from shlex import quote
 
 from kempf.flows.jobs.affected_sets import Affected, of_logs
+from kempf.flows.jobs.former_vessel import former_vessels, reason_of_rename
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
-from kempf.schemas.errors import NotFound, UsageError
+from kempf.flows.process.wrap_error import wrapped
+from kempf.schemas.enumeration import counted
+from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, segments, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.equivalents import codes_of
@@ -54,7 +58,7 @@ def _mark(warehouse: Warehouse, rows: Sequence[LogRow], reason: str | None) -> N
 
 
 def restore(warehouse: Warehouse, name: str) -> LogRow:
-    """Let a log that was removed count again.
+    """Let a log that was removed count again; where its vessel was removed too, so does she.
 
     Parameters
     ----------
@@ -64,7 +68,7 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
     Raises
     ------
     NotFound
-        ``no_log``: none that was removed has this name. ``no_vessel``: its vessel was removed too.
+        ``no_log``: none that was removed has this name. ``vessel_renamed``: its vessel has another name now.
     UsageError
         ``ambiguous_log``.
     DataRejected
@@ -72,7 +76,13 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
     """
     row = logs.by_prefix(warehouse, name, removed=True)
     purges.refuse(warehouse, [row.log_id])
-    vessels.require(warehouse, row.vessel)
+    former = former_vessels(warehouse).get(row.vessel)
+    if former is not None and former.now is not None:
+        raise former.refused(
+            f"{row.file_name} was a log of {row.vessel!r}, which {former.words}.",
+            f"`kempf logs move {row.log_id[:12]} --vessel {quote(former.now)} --reason TEXT` makes it hers.",
+        )
+    vessels.bring_back(warehouse, row.vessel)
     _mark(warehouse, [row], None)
     return logs.by_prefix(warehouse, row.log_id)
 
@@ -206,8 +216,11 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
     ------
     NotFound
         ``no_warehouse``, ``no_vessel``.
+        ``no_raw_log``: the bytes of one of her logs are not kept; then nothing has changed.
     UsageError
         ``vessel_exists``, ``no_reason``, ``vessel_name``.
+    KempfError
+        A log cannot be read; the error says how many are moved, and the same command goes on.
     """
     require_reason(reason)
     profile = vessels.current(warehouse, vessel)
@@ -221,9 +234,39 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
             "Choose another name, or give her logs to that vessel with `kempf logs move`.",
             {"vessel": name},
         )
+    held = [*logs.current(warehouse, vessel), *_on_their_way(warehouse, vessel, name)]
+    _require_raw(warehouse, vessel, held)
     vessels.register(warehouse, name, renamed)
-    for row in [*logs.current(warehouse, vessel), *_on_their_way(warehouse, vessel, name)]:
-        move(warehouse, row.log_id, name, reason)
+    for row in held:
+        try:
+            move(warehouse, row.log_id, name, reason)
+        except Exception as error:
+            raise _stopped(wrapped(error), vessel, name, logs.current(warehouse, name), held) from error
     notes.carry(warehouse, "vessel", vessel, vessel, name)
-    vessels.remove(warehouse, vessel, f"renamed to {name!r}: {reason}")
+    vessels.remove(warehouse, vessel, reason_of_rename(name, reason))
     return logs.current(warehouse, name)
+
+
+def _require_raw(warehouse: Warehouse, vessel: str, rows: Sequence[LogRow]) -> None:
+    """Do nothing where the bytes of all logs are kept; whether they are whole is seen when they are read."""
+    kept = set(raw.kept(warehouse))
+    lost = [row for row in rows if row.log_id not in kept]
+    if lost:
+        names = ", ".join(f"{row.file_name} ({row.log_id[:12]})" for row in lost[:5])
+        raise NotFound(
+            "no_raw_log",
+            f"Of {counted(len(rows), 'log')} of {vessel!r} the raw bytes of {len(lost)} are not kept any more: {names}"
+            f"{' ...' if lost[5:] else ''}. No log was moved.",
+            f"Ingest the original files again with `kempf ingest FILE --vessel {quote(vessel)}`, or take them out "
+            "with `kempf logs remove`; then give the same command again.",
+            {"vessel": vessel, "logs": [row.log_id for row in lost]},
+        )
+
+
+def _stopped(error: KempfError, vessel: str, name: str, moved: Sequence[LogRow], held: Sequence[LogRow]) -> KempfError:
+    """Return the error that stopped a rename, with how far it came."""
+    left = {row.log_id for row in held} - {row.log_id for row in moved}
+    error.message += f" So far {len(moved)} of {counted(len(moved) + len(left), 'log')} of {vessel!r} went to {name!r}."
+    error.next_step += " Then give the same command again: it goes on with the others."
+    error.details |= {"moved": [row.log_id for row in moved], "not_moved": sorted(left)}
+    return error

@@ -7,10 +7,13 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
+from shlex import quote
 from typing import Any
 
 from kempf.flows.jobs.files import profile_of, whole
+from kempf.flows.jobs.former_vessel import former_vessels
 from kempf.flows.jobs.inbox_place import PROFILES, Register
+from kempf.flows.jobs.inbox_remarks import remarks
 from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest_log, laid_over
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -18,9 +21,10 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile, merge
-from kempf.warehouse import code_version, inbox, vessels
+from kempf.warehouse import code_version, inbox, logs, purges, vessels
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.inbox import InboxFile
+from kempf.warehouse.logs import LogRow
 from kempf.warehouse.source_folder import SourceFile, SourceFolder
 from kempf.warehouse.store import Warehouse
 
@@ -57,6 +61,10 @@ class InboxRun:
     waiting: tuple[str, ...]
     #: Files that were known and have not changed.
     known: int
+    #: Of these that this run looked at, files with the bytes of a log that a person removed; they were left alone.
+    removed: tuple[InboxFile, ...] = ()
+    #: What is strange about the inbox itself, a sentence each.
+    remarks: tuple[str, ...] = ()
 
     def as_json(self) -> dict[str, Any]:
         """Return the run as JSON content."""
@@ -66,6 +74,8 @@ class InboxRun:
             "quarantined": [{**quarantine_json(file), "new": file.address in self.tried} for file in self.quarantined],
             "waiting": list(self.waiting),
             "known": self.known,
+            "removed": [{**quarantine_json(file), "log_id": file.log_id} for file in self.removed],
+            "remarks": list(self.remarks),
         }
 
 
@@ -90,7 +100,7 @@ class NeedsAPerson(DataRejected):
 
 
 def quarantine_json(file: InboxFile) -> dict[str, Any]:
-    """Return a file in quarantine as JSON content."""
+    """Return a file that was not ingested as JSON content."""
     return {
         "file": file.address,
         "size_bytes": file.size_bytes,
@@ -130,10 +140,11 @@ def take_inbox(
     KempfError
         What `SourceFolder.list` raises; ``disk_full``, ``warehouse_not_writable``, ...: no file's fault.
     """
-    files = folder.list()
+    listing = folder.list()
+    files = listing.files
     before = inbox.below(warehouse, folder.address)
     folders = _read_folders(folder, files)
-    register = Register(vessels.profiles(warehouse), folders.profiles, new_vessels)
+    register = Register(vessels.profiles(warehouse), folders.profiles, new_vessels, former_vessels(warehouse))
     settled_ns = time.time_ns() - round(settle_s * 1e9)
     waiting, due = [], []
     bags = {_beside_what(file) for file in files if file.name.endswith(_OF_BAGS)}
@@ -150,10 +161,13 @@ def take_inbox(
         *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
     )
     rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
+    removed: list[InboxFile] = []
     for done, arrival in enumerate(todo):
         progress(done, len(todo), f"reading {arrival.file.name}")
         row, outcome = take(warehouse, folder, arrival)
         rows.append(row)
+        if row.outcome == "removed":
+            removed.append(row)
         if outcome is not None:
             outcomes.append(outcome)
         if len(rows) >= _TOGETHER:
@@ -171,6 +185,8 @@ def take_inbox(
         frozenset(tried),
         tuple(waiting),
         len(due) - len(todo),
+        tuple(removed),
+        tuple(remarks(listing, before.values())),
     )
 
 
@@ -180,10 +196,10 @@ def _beside_what(file: SourceFile) -> str:
 
 
 def _gone(files: Sequence[SourceFile], before: Mapping[str, InboxFile]) -> list[InboxFile]:
-    """Return the rows that end the quarantine of files that were moved, renamed or deleted."""
+    """Return the rows that end the quarantine of files that were moved, renamed or deleted, until they return."""
     there = {file.address for file in files}
     left = [row for row in before.values() if row.outcome == "quarantined" and row.address not in there]
-    return [replace(row, outcome="dismissed", message="It is no longer in the inbox.", next_step=None) for row in left]
+    return [replace(row, outcome="gone", message=inbox.NO_LONGER_THERE, next_step=None) for row in left]
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,8 +269,8 @@ class Placed:
         )[:16]
 
     def is_new(self, known: InboxFile | None) -> bool:
-        """Return whether it is to be looked at: it is new, was written since, or may be read now."""
-        if known is None:
+        """Return whether it is to be looked at: it is new or back, was written since, or may be read now."""
+        if known is None or known.outcome == "gone":
             return True
         if (known.size_bytes, known.modified_utc_ns) != (self.file.size_bytes, self.file.modified_utc_ns):
             return True
@@ -270,8 +286,15 @@ def _placed(register: Register, file: SourceFile) -> Placed:
     return Placed(file, place.vessel, laid_over(stored, place.given, place.vessel))
 
 
-def take(warehouse: Warehouse, folder: SourceFolder, arrival: Placed) -> tuple[InboxFile, IngestOutcome | None]:
+def take(
+    warehouse: Warehouse, folder: SourceFolder, arrival: Placed, *, by_hand: bool = False
+) -> tuple[InboxFile, IngestOutcome | None]:
     """Ingest one file; where it cannot be placed or read, return the row that puts it into quarantine.
+
+    Parameters
+    ----------
+    by_hand : bool, optional
+        Whether a person asks for this very file; else one with the bytes of a log that was removed is left alone.
 
     Raises
     ------
@@ -284,7 +307,11 @@ def take(warehouse: Warehouse, folder: SourceFolder, arrival: Placed) -> tuple[I
             assert arrival.error is not None
             raise arrival.error
         with folder.opened(file) as stream:
-            outcome = ingest_log(warehouse, arrival.vessel, file.name, LogFile(stream), arrival.profile, file.address)
+            log = LogFile(stream)
+            gone = None if by_hand else _removed(warehouse, log)
+            if gone is not None:
+                return _left_alone(arrival, gone), None
+            outcome = ingest_log(warehouse, arrival.vessel, file.name, log, arrival.profile, file.address)
     except Exception as error:  # whatever it is, the next log must not pay for it
         failure = wrapped(error)
         if failure.code in _NO_FILES:
@@ -296,6 +323,27 @@ def take(warehouse: Warehouse, folder: SourceFolder, arrival: Placed) -> tuple[I
         basis=arrival.basis,
     )
     return row, outcome
+
+
+def _removed(warehouse: Warehouse, log: LogFile) -> LogRow | None:
+    """Return what is known of a log that a person removed; None of any other, and of one that was purged."""
+    row = logs.find(warehouse, [log.sha256]).get(log.sha256)
+    return None if row is None or row.removed is None or purges.of_logs(warehouse, [row.log_id]) else row
+
+
+def _left_alone(arrival: Placed, row: LogRow) -> InboxFile:
+    back = f"`kempf logs restore {row.log_id[:12]}` brings it back"
+    if arrival.vessel is not None and arrival.vessel != row.vessel:
+        given = f"`kempf logs move {row.log_id[:12]} --vessel {quote(arrival.vessel)} --reason TEXT`"
+        back += f"; {given} makes it a log of {arrival.vessel!r}"
+    return InboxFile(
+        *(arrival.file.address, arrival.file.size_bytes, arrival.file.modified_utc_ns, "removed"),
+        *(arrival.vessel, row.log_id),
+        code="log_removed",
+        message=f"It is the log {row.file_name} of {row.vessel!r}, which was removed: {row.removed}.",
+        next_step=f"It is left alone. {back}.",
+        basis=arrival.basis,
+    )
 
 
 def _quarantined(file: SourceFile, vessel: str | None, error: KempfError, basis: str | None) -> InboxFile:

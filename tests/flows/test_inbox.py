@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import yaml
 
 from kempf.flows.fleet.arrivals import LogsFailed
 from kempf.flows.jobs.release_log import dismiss, release
+from kempf.flows.jobs.remove_logs import remove, remove_vessel, rename_vessel
 from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.warehouse import inbox, logs, vessels
@@ -160,6 +162,109 @@ def test_a_folder_that_was_renamed_waits_for_nobody_any_more(place: Path, marine
     (place / "marinner" / "second.nmea.gz").rename(place / "mariner" / "second.nmea.gz")
     done = taken(place, warehouse)
     assert [Path(one.path).name for one in done.ingested] == ["second.nmea.gz"] and done.quarantined == ()
+
+
+def test_what_was_gone_for_a_night_is_tried_again_when_it_is_back(
+    place: Path, mariner: Ship, warehouse: Warehouse, tmp_path: Path
+) -> None:
+    assert len(taken(place, warehouse).quarantined) == 1 and not taken(place, warehouse).remarks
+    place.rename(tmp_path / "elsewhere")
+    place.mkdir()
+    gone = taken(place, warehouse)
+    assert gone.quarantined == () and "The inbox is empty, where 2 files lay before" in gone.remarks[0]
+    shown = kempf("inbox", place, "--settle", 0, "--warehouse", warehouse.uri)
+    assert shown.code == 0 and "The inbox is empty" in shown.err
+    place.rmdir()
+    (tmp_path / "elsewhere").rename(place)
+    back = taken(place, warehouse)
+    (pdf,) = back.quarantined
+    assert pdf.address.endswith("minutes.pdf") and pdf.address in back.tried and back.known == 1 and not back.remarks
+    # a row of earlier versions, which stored as dismissed what was only gone; what a person dismissed stays so
+    inbox.record(warehouse, [replace(pdf, outcome="dismissed", message="It is no longer in the inbox.")])
+    assert len(taken(place, warehouse).quarantined) == 1
+    dismiss(warehouse, "minutes.pdf", "no log")
+    (place / "mariner" / "minutes.pdf").rename(tmp_path / "minutes.pdf")
+    taken(place, warehouse)
+    (tmp_path / "minutes.pdf").rename(place / "mariner" / "minutes.pdf")
+    assert taken(place, warehouse).quarantined == ()
+
+
+@pytest.mark.parametrize("named_by", ["folder", "profile"])
+def test_a_vessel_that_was_renamed_or_removed_is_not_made_again(
+    place: Path, mariner: Ship, warehouse: Warehouse, named_by: str
+) -> None:
+    (place / "mariner" / "minutes.pdf").unlink()
+    taken(place, warehouse)
+    if named_by == "folder":
+        (place / "mariner" / "profile.yaml").unlink()
+    rename_vessel(warehouse, "mariner", "sailor", "sold")
+    rename_vessel(warehouse, "sailor", "seaman", "sold again")
+    (place / "mariner" / "second.nmea.gz").write_bytes(mariner.nmea)
+    for new_vessels in (False, True):
+        run = take_inbox(warehouse, SourceFolder(str(place)), settle_s=0.0, new_vessels=new_vessels)
+        (held,) = run.quarantined
+        assert held.code == "vessel_renamed" and "renamed to 'seaman': sold" in str(held.message)
+        assert 'vessel: "seaman"' in str(held.next_step) and "logs release" in str(held.next_step)
+        assert vessels.names(warehouse) == ["seaman"]
+    by_hand = kempf("ingest", place / "mariner" / "second.nmea.gz", "--vessel", "mariner", "--warehouse", warehouse.uri)
+    assert by_hand.code == 4 and "--vessel seaman" in by_hand.err
+    remove_vessel(warehouse, "seaman", "a slip")
+    (held,) = taken(place, warehouse).quarantined
+    assert held.code == "vessel_removed" and "kempf vessels set mariner" in str(held.next_step)
+    assert vessels.names(warehouse) == []
+    # a ship that has the old name now is made by one command, and her folder is hers from then on
+    assert release(warehouse, "second.nmea.gz", "mariner", new_vessel=True).outcome == "new"
+    assert taken(place, warehouse).quarantined == ()
+
+
+def test_a_log_that_a_person_removed_stays_removed_when_it_is_delivered_again(
+    place: Path, warehouse: Warehouse
+) -> None:
+    (place / "mariner" / "minutes.pdf").unlink()
+    taken(place, warehouse)
+    (row,) = logs.current(warehouse)
+    remove(warehouse, [row], "wrong draught")
+    os.utime(place / "mariner" / "day.csv.gz", (1, 1))
+    run = taken(place, warehouse)
+    (left,) = run.removed
+    assert run.ingested == run.quarantined == () and "wrong draught" in str(left.message)
+    assert f"kempf logs restore {row.log_id[:12]}" in str(left.next_step) and logs.current(warehouse) == []
+    assert run.as_json()["removed"][0]["log_id"] == row.log_id
+    again = taken(place, warehouse)
+    assert again.removed == () and again.known == 1
+    os.utime(place / "mariner" / "day.csv.gz", (2, 2))
+    at = ("--warehouse", warehouse.uri)
+    shown = kempf("inbox", place, "--settle", 0, *at)
+    assert shown.code == 0 and "0 logs ingested, 1 removed before and left alone, 0 known" in shown.out
+    assert "wrong draught" in shown.err
+    by_hand = kempf("ingest", place / "mariner" / "day.csv.gz", "--vessel", "mariner", *at)
+    assert by_hand.code == 0 and "had been removed (wrong draught)" in by_hand.out
+    assert [one.log_id for one in logs.current(warehouse)] == [row.log_id]
+
+
+def test_links_are_followed_once_and_those_that_lead_nowhere_are_said(
+    place: Path, warehouse: Warehouse, tmp_path: Path
+) -> None:
+    (place / "mariner" / "minutes.pdf").unlink()
+    (place / "mariner" / "loop").symlink_to(place / "mariner")
+    (place / "a").symlink_to("mariner")
+    (place / "mariner" / "day9.csv").symlink_to("/not/mounted/day9.csv")
+    (tmp_path / "share").mkdir()
+    (place / "mariner" / "day.csv.gz").rename(tmp_path / "share" / "day.csv.gz")
+    (place / "mariner" / "linked").symlink_to(tmp_path / "share")
+    listing = SourceFolder(str(place)).list()
+    assert [file.path for file in listing.files] == ["mariner/linked/day.csv.gz", "mariner/profile.yaml"]
+    assert listing.dangling == ("mariner/day9.csv",) and listing.not_entered == ("a", "mariner/loop")
+    run = taken(place, warehouse)
+    assert len(run.ingested) == 1 and run.quarantined == ()
+    assert "1 link leads nowhere" in run.remarks[0] and "mariner/day9.csv" in run.remarks[0]
+    assert "2 folders are looked through under other paths already" in run.remarks[1]
+
+
+def test_a_name_that_is_no_text_stops_no_other_file(place: Path, warehouse: Warehouse) -> None:
+    Path(os.fsdecode(os.fsencode(place / "mariner") + b"/tag\xfc.csv")).write_bytes(b"x")
+    run = taken(place, warehouse)
+    assert len(run.ingested) == 1 and "mariner/tag\\udcfc.csv" in run.remarks[0]
 
 
 def test_a_file_that_could_not_be_read_for_a_moment_is_tried_again(

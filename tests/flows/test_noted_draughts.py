@@ -12,6 +12,7 @@ from kempf.flows.jobs import remove_logs
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.remove_logs import move, rename_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
@@ -25,10 +26,11 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, history, logs, notes, parameter_sets, vessels
+from kempf.warehouse import aliases, history, logs, notes, parameter_sets, segments, vessels
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
+from tests.workbench.driving import kempf
 
 DAY_NS = 86_400_000_000_000
 #: m, of her trials; the second and third are deeper by two tenths
@@ -174,6 +176,30 @@ def test_notes_go_with_a_moved_log_and_a_renamed_vessel(ferry: Warehouse) -> Non
     (kept,) = (one for one in notes.of_vessel(ferry, "ro-ro") if one.subject == "vessel")
     assert (kept.subject_id, kept.event_utc_ns) == ("ro-ro", 1_000)
     assert kept.text == f"docked [ferry, note {docked.number}]"
+
+
+def test_a_note_that_comes_back_is_the_original_again(ferry: Warehouse) -> None:
+    row = min(logs.current(ferry), key=lambda row: row.file_name)
+    manoeuvre = next(one for one in segments.current(ferry, "ferry") if one.log_id == row.log_id)
+    on_log = notes.add(ferry, "ferry", "log", row.log_id, "laden [ferry, note 7]", draught_m=6.1)
+    on_segment = notes.add(ferry, "ferry", "segment", manoeuvre.segment_id, "gusty")
+    vessels.register(ferry, "sister", vessels.current(ferry, "ferry").model_copy(update={"vessel": "sister"}))
+    for _ in range(2):
+        move(ferry, row.log_id, "sister", "wrong folder")
+        assert notes_of_hers(ferry, "ferry") == [] and len(notes_of_hers(ferry, "sister")) == 2
+        move(ferry, row.log_id, "ferry", "hers after all")
+        assert notes_of_hers(ferry, "ferry") == [on_log, on_segment] and notes_of_hers(ferry, "sister") == []
+    assert len(notes.of_vessel(ferry)) == 4
+    # as earlier versions carried it back: it is shown once
+    copy = notes.of_vessel(ferry, "sister")[0]
+    notes.add(ferry, "ferry", "log", row.log_id, f"{copy.text} [sister, note {copy.number}]", draught_m=6.1)
+    assert notes_of_hers(ferry, "ferry") == [on_log, on_segment]
+    docked = notes.add(ferry, "ferry", "vessel", "ferry", "docked")
+    rename_vessel(ferry, "ferry", "ro-ro", "sold")
+    rename_vessel(ferry, "ro-ro", "ferry", "bought back")
+    assert notes_of_hers(ferry, "ferry") == [on_log, on_segment, docked]
+    listed = kempf("note", "--vessel", "sister", "--warehouse", ferry.uri)
+    assert listed.code == 0 and listed.out.strip() == "no notes"
 
 
 def test_notes_are_there_once_where_a_move_was_cut_off(ferry: Warehouse) -> None:

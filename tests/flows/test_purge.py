@@ -166,6 +166,19 @@ def test_the_command_says_first_what_goes(warehouse: Warehouse) -> None:
     refused(blank, 2, "no_reason")
 
 
+def test_a_second_purge_says_that_it_is_done_and_deletes_nothing(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    row, other = logs.current(warehouse)
+    receipt = purge(warehouse, row.log_id, "by law")
+    monkeypatch.setattr(purge_logs, "erase", lambda *_: pytest.fail("it deletes again"))
+    at = ("--warehouse", warehouse.uri)
+    again = kempf("purge", row.log_id, "--reason", "once more", *at)
+    assert again.code == 0 and "deleted for good already (by law); nothing more was deleted" in again.out
+    assert kempf("purge", row.log_id, "--reason", "once more", "--json", *at).json == receipt.as_json()
+    assert logs.current(warehouse) == [other]
+
+
 def test_what_a_repair_kept_aside_goes_too(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     first, second = logs.current(warehouse)

@@ -14,8 +14,8 @@ from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse import aliases, history, logs, notes, parameter_sets, segments, vessels
+from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
+from kempf.warehouse import aliases, history, logs, notes, parameter_sets, raw, segments, vessels
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
@@ -118,6 +118,57 @@ def test_a_rename_that_was_cut_off_within_the_move_of_a_log_goes_on(
     assert len(logs.removed(warehouse, "mariner")) == 1
     rows = rename_vessel(warehouse, "mariner", "sailor", "sold")
     assert {row.log_id for row in rows} == held and vessels.names(warehouse) == ["sailor"]
+
+
+def test_a_rename_looks_first_whether_the_bytes_of_all_logs_are_there(warehouse: Warehouse) -> None:
+    rows = logs.current(warehouse)
+    lost = rows[-1]
+    raw.delete(warehouse, lost.log_id)
+    with pytest.raises(NotFound, match="No log was moved") as found:
+        rename_vessel(warehouse, "mariner", "sailor", "sold")
+    assert found.value.code == "no_raw_log" and lost.file_name in found.value.message
+    assert vessels.names(warehouse) == ["mariner"] and logs.current(warehouse) == rows
+    assert "current" in aliases.of_vessel(warehouse, "mariner")
+
+
+def test_a_rename_that_stops_half_way_says_how_far_it_came(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    second = logs.current(warehouse)[-1]
+    whole = raw.opened
+
+    def damaged(warehouse: Warehouse, name: str) -> object:
+        if name == second.log_id:
+            raise KempfError("raw_bytes_damaged", "It is damaged.", "Ingest it again.")
+        return whole(warehouse, name)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(raw, "opened", damaged)
+        with pytest.raises(KempfError, match="went to 'sailor'") as found:
+            rename_vessel(warehouse, "mariner", "sailor", "sold")
+    assert found.value.code == "raw_bytes_damaged" and "1 of 2 logs" in found.value.message
+    assert "give the same command again" in found.value.next_step
+    assert len(rename_vessel(warehouse, "mariner", "sailor", "sold")) == 2
+
+
+def test_a_removed_vessel_comes_back_with_a_log_of_hers(warehouse: Warehouse) -> None:
+    at = ("--warehouse", warehouse.uri)
+    first, second = logs.current(warehouse)
+    profile = vessels.current(warehouse, "mariner")
+    removed = kempf("vessels", "remove", "mariner", "--reason", "a slip", "--yes", *at)
+    assert "kempf logs restore LOG" in removed.out and "kempf logs list --removed --vessel mariner" in removed.out
+    assert len(kempf("logs", "list", "--removed", "--vessel", "mariner", "--json", *at).json) == 2
+    back = kempf("logs", "restore", first.log_id, *at)
+    assert back.code == 0 and "the vessel 'mariner' with it" in back.out
+    assert vessels.current(warehouse, "mariner") == profile
+    assert [row.log_id for row in logs.current(warehouse, "mariner")] == [first.log_id]
+    # under her new name she is the same ship: the old name stays gone
+    rename_vessel(warehouse, "mariner", "sailor", "sold")
+    with pytest.raises(NotFound, match="renamed to 'sailor'") as found:
+        restore(warehouse, second.log_id)
+    assert found.value.code == "vessel_renamed" and "logs move" in found.value.next_step
+    move(warehouse, second.log_id, "sailor", "hers")
+    assert vessels.names(warehouse) == ["sailor"] and len(logs.current(warehouse, "sailor")) == 2
 
 
 def test_a_removal_that_was_cut_off_goes_on_with_what_follows_from_it(

@@ -201,11 +201,13 @@ def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> No
 
 def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:
     """Print what people noted of the vessels, by that time."""
+    from kempf.flows.jobs.notes_of_hers import notes_of_hers
     from kempf.warehouse import notes
     from kempf.workbench.cli.note import words_of
 
     for name in names:
-        for note in notes.of_vessel(warehouse, name):
+        # of an earlier time also those on logs that went to another vessel since
+        for note in notes_of_hers(warehouse, name) if as_of is None else notes.of_vessel(warehouse, name):
             if as_of is None or note.written is None or note.written <= as_of:
                 click.echo(f"note: {words_of(note)}")
 

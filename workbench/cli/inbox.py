@@ -9,7 +9,7 @@ import click
 from kempf.schemas.enumeration import counted
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, new_vessel_option, verbose_option, warehouse_option
-from kempf.workbench.terminal import one_line, print_json, progress_bar
+from kempf.workbench.terminal import one_line, print_json, print_note, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.take_inbox import InboxRun
@@ -68,7 +68,17 @@ def _print_run(run: InboxRun) -> None:
         parts.append(
             f"{len(run.waiting)} left for the next run, as they are being written or their profile is not read"
         )
+    if run.removed:
+        parts.insert(1, f"{len(run.removed)} removed before and left alone")
     click.echo(", ".join(parts))
+    for remark in run.remarks:
+        print_note(remark)
+    for file in run.removed:
+        click.echo(
+            f"{click.style('removed before', fg='yellow')} {one_line(file.address)}\n"
+            f"  {one_line(file.message or '')} {one_line(file.next_step or '')}",
+            err=True,
+        )
     for file in run.quarantined:
         mark = "" if file.address in run.tried else " (as before)"
         click.echo(

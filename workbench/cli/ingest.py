@@ -92,6 +92,9 @@ def _print_outcome(outcome: IngestOutcome) -> None:
         click.echo(f"{name}: {click.style('failed', fg='red')} [{outcome.error.code}] {outcome.error}", err=True)
         return
     click.echo(f"{name}: {outcome.outcome}, {_ledger(outcome.tally)}; {_found(outcome)}")
+    if outcome.was_removed is not None:
+        label = click.style("removed before", fg="yellow")
+        click.echo(f"  {label}: this log had been removed ({one_line(outcome.was_removed)}); now it counts again")
     if outcome.lost:
         from kempf.flows.jobs.unreadable_stretches import as_json
 

@@ -50,7 +50,7 @@ def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> Non
     warehouse = Warehouse(uri)
     if removed:
         warehouse.require()
-        if vessel is not None:
+        if vessel is not None and vessel not in vessels.removed(warehouse):
             vessels.require(warehouse, vessel)
         _list_removed(logs.removed(warehouse, vessel), as_json)
         return
@@ -259,17 +259,22 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
 @warehouse_option
 @json_option
 def restore_log(log_id: str, uri: str, as_json: bool) -> None:
-    """Let a log that was removed count again."""
+    """Let a log that was removed count again, and its vessel where she was removed too."""
     from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import restore
+    from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.logs import facts_of
 
-    row = restore(Warehouse(uri), log_id)
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    gone = vessels.removed(warehouse)
+    row = restore(warehouse, log_id)
     if as_json:
-        print_json(facts_of(row))
+        print_json({**facts_of(row), "vessel_restored": row.vessel in gone})
     else:
-        click.echo(f"{one_line(row.file_name)}: counts again; next: {command_for([row.vessel])}")
+        also = f", and the vessel {row.vessel!r} with it" if row.vessel in gone else ""
+        click.echo(f"{one_line(row.file_name)}: counts again{also}; next: {command_for([row.vessel])}")
 
 
 @command.command("move")

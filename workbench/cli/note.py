@@ -42,6 +42,7 @@ def command(
     Notes are only ever added; `kempf history` shows them. Where a draught is noted for every log of a vessel, the
     effect load_condition goes by it.
     """
+    from kempf.flows.jobs.notes_of_hers import notes_of_hers
     from kempf.flows.jobs.subject_of_note import subject_of
     from kempf.warehouse import notes, vessels
     from kempf.warehouse.store import Warehouse
@@ -56,7 +57,7 @@ def command(
             raise UsageError("no_note", "There is no text.", "Write the note, in quotes, behind `kempf note`.")
         if vessel is not None:
             vessels.require(warehouse, vessel)
-        listed = notes.of_vessel(warehouse, vessel)
+        listed = notes.of_vessel(warehouse) if vessel is None else notes_of_hers(warehouse, vessel)
         if as_json:
             print_json([entry.as_json() for entry in listed])
         elif not listed:

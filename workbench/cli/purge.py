@@ -24,11 +24,20 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     kept, and the log is not taken in again. For what was only a mistake there is `kempf logs remove`.
     """
     from kempf.flows.jobs.out_of_date import command_for
-    from kempf.flows.jobs.purge_logs import purge, what_goes
+    from kempf.flows.jobs.purge_logs import is_done, purge, what_goes
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     goes = what_goes(warehouse, log_id, reason)
+    if is_done(warehouse, goes.log_id):
+        if as_json:
+            print_json(goes.as_json())
+        else:
+            click.echo(
+                f"{one_line(goes.file_name)} of {goes.vessel!r} is deleted for good already ({one_line(goes.reason)}); "
+                "nothing more was deleted"
+            )
+        return
     shown = (
         f"{one_line(goes.file_name)} of {goes.vessel!r} is deleted for good: {counted(goes.size_bytes, 'byte')}, "
         f"{counted(goes.readings, 'reading')}, {counted(goes.rejected, 'rejected record')}, and what was measured "

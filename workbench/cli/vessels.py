@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -94,8 +95,14 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     affected = remove_vessel(warehouse, name, reason)
     if as_json:
         print_json({"vessel": name, "removed": True, "following": affected.as_json() if affected else None})
-    else:
-        click.echo(f"{name}: removed")
+        return
+    back = f"`kempf vessels set {quote(name)} --profile FILE` brings her back"
+    if held:
+        back = (
+            f"`kempf logs restore LOG` brings a log of hers back, and her with it; `kempf logs list --removed --vessel "
+            f"{quote(name)}` lists them"
+        )
+    click.echo(f"{name}: removed, with {counted(len(held), 'log')}; {back}")
 
 
 @command.command("rename")

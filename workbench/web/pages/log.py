@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse import logs, lost, notes, segments
+from kempf.warehouse import logs, lost, segments
 from kempf.workbench.documents.logs import log_document
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
@@ -33,7 +34,7 @@ def gather(app_state: AppState, log_id: str, asked_from: str | None, asked_to: s
         if manoeuvre.ingest_id == row.ingest_id
     ]
     gone = lost.of_ingests(app_state.warehouse, [row.ingest_id]).get(row.ingest_id, ())
-    vessel_notes = notes.of_vessel(app_state.warehouse, row.vessel)
+    vessel_notes = notes_of_hers(app_state.warehouse, row.vessel)
     shown = log_document(app_state.warehouse, row)
     content = {
         "log": shown,

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from kempf.flows.jobs.notes_of_hers import notes_of_hers
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.instants import iso_utc, minute
-from kempf.warehouse import aliases, logs, lost, notes, segments
+from kempf.warehouse import aliases, logs, lost, segments
 from kempf.workbench.charts.channels import derived
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
@@ -48,7 +49,7 @@ def gather(app_state: AppState, segment_id: str, fields: Mapping[str, str]) -> P
     beyond = int(_MARGIN * (segment.end_utc_ns - segment.start_utc_ns))
     first, last = max(segment.start_utc_ns - beyond, row.start_utc_ns), min(segment.end_utc_ns + beyond, row.end_utc_ns)
     begin, end = window(fields.get("from"), fields.get("to"), first, last)
-    vessel_notes = notes.of_vessel(app_state.warehouse, row.vessel)
+    vessel_notes = notes_of_hers(app_state.warehouse, row.vessel)
     gone = lost.of_ingests(app_state.warehouse, [row.ingest_id]).get(row.ingest_id, ())
     compared = segment.is_fitted and segment.excluded is None
     current = compared and aliases.CURRENT in aliases.of_vessel(app_state.warehouse, row.vessel)

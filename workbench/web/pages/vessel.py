@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.jobs.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS
-from kempf.warehouse import aliases, diagnoses, history, notes
+from kempf.warehouse import aliases, diagnoses, history
 from kempf.workbench.documents.logs import listed_logs
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike
 from kempf.workbench.documents.parameter_sets import listed_sets
@@ -40,7 +41,7 @@ def gather(app_state: AppState, vessel: str) -> Page:
             sets=[{**row, "standing": row["parameter_set_id"] in standing} for row in sets],
         ),
         "diagnoses": [diagnosis.as_json() for diagnosis in diagnoses.of_vessel(warehouse, vessel)],
-        "notes": [note.as_json() for note in notes.of_vessel(warehouse, vessel)],
+        "notes": [note.as_json() for note in notes_of_hers(warehouse, vessel)],
         "current": any(aliases.CURRENT in row["aliases"] for row in sets),
         "ladder": any(aliases.CURRENT in row["aliases"] and row["estimator"] in (POOLED, WITH_EFFECTS) for row in sets),
         "jobs": jobs.rows([job for job in app_state.queue.active() if job.arguments["vessel"] == vessel]),
