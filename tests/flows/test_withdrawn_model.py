@@ -10,6 +10,7 @@ import pytest
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.ingest_logs import ingest_log
 from kempf.flows.jobs.pending import Waiting
+from kempf.flows.jobs.remove_logs import rename_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.standing_model import POOLED, standing_model, undo
 from kempf.flows.jobs.vessel_report import VesselReport
@@ -69,6 +70,12 @@ def test_a_renamed_vessel_has_the_model_that_she_had(warehouse: Warehouse) -> No
     aliases.point_all(warehouse, {("boreas", aliases.WITHDRAWN): name})
     assert standing_model(warehouse, "boreas")[0] == LAGGING
     assert not Waiting(warehouse, "boreas").may_move(PLAIN, adopt=False)
+
+
+def test_a_rename_hands_the_model_on(warehouse: Warehouse) -> None:
+    rename_vessel(warehouse, "aurora", "boreas", "sold")
+    assert standing_model(warehouse, "boreas")[0] == LAGGING
+    assert "aurora" not in vessels.profiles(warehouse)
 
 
 def test_a_night_says_that_the_model_is_lost_and_leaves_it_so(tmp_path: Path) -> None:

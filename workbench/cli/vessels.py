@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,6 +14,9 @@ from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
 from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from kempf.warehouse.store import Warehouse
 
 
 @click.group("vessels", cls=GivenOnceGroup)
@@ -105,6 +109,14 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     click.echo(f"{name}: removed, with {counted(len(held), 'log')}; {back}")
 
 
+def _stays(warehouse: Warehouse, name: str) -> str:
+    """Return what of a vessel's sets does not go along, a phrase."""
+    from kempf.warehouse import aliases
+
+    named = sorted(aliases.of_vessel(warehouse, name).keys() - {aliases.CURRENT, aliases.WITHDRAWN})
+    return f"; {', '.join(named)} and notes on sets stay with the sets of the old name" if named else ""
+
+
 @command.command("rename")
 @click.argument("name")
 @click.argument("new_name")
@@ -126,7 +138,7 @@ def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: 
     confirm(
         what_goes(
             of_logs(warehouse, held) if held else None,
-            f"{name!r} is renamed to {new_name!r} and her logs are read again",
+            f"{name!r} is renamed to {new_name!r} and her logs are read again{_stays(warehouse, name)}",
         ),
         yes=yes,
     )
