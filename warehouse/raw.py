@@ -130,10 +130,10 @@ def is_half_described(warehouse: Warehouse, name: str) -> bool:
 
 
 def delete(warehouse: Warehouse, name: str) -> None:
-    """Delete a log, what is kept beside it, and what writers of it that were killed left behind."""
+    """Delete a log, what is kept beside it, and what writers of it that were killed left behind; no receipt of that."""
     folder = _place(name)[:-1]
     for file in warehouse.files_below(*folder):
-        if name in file:
+        if name in file and file != f"{name}{purges.NOTE}":
             warehouse.delete(*folder, file)
 
 
