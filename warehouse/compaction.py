@@ -16,7 +16,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, seals, written
+from kempf.warehouse import delta, purges, seals, written
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -80,6 +80,7 @@ def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
         ``disk_full``, ``warehouse_not_writable``.
     """
     warehouse.require()
+    purges.note_all(warehouse)  # of purges from before receipts were kept twice
     return tuple(name for name in TABLES if with_retry(partial(_one, warehouse, name, more_files_than)))
 
 
