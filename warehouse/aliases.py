@@ -135,6 +135,12 @@ def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     return {vessel: names[alias] for vessel, names in pointed.items() if alias in names}
 
 
+def every(warehouse: Warehouse) -> dict[tuple[str, str], str]:
+    """Return the parameter set id that every alias points to, by vessel and alias, sorted."""
+    rows = delta.read(warehouse, "aliases", {}, ("vessel", "alias", "parameter_set_id"))
+    return dict(sorted(((vessel, alias), name) for vessel, alias, name in rows.rows()))
+
+
 def _pointed(rows: pl.DataFrame) -> dict[str, str]:
     """Return the parameter set id of every alias in the rows of one vessel, sorted by alias."""
     return dict(sorted(zip(rows["alias"].to_list(), rows["parameter_set_id"].to_list(), strict=True)))

@@ -16,7 +16,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, seals
+from kempf.warehouse import delta, purges, seals, written
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -80,6 +80,7 @@ def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
         ``disk_full``, ``warehouse_not_writable``.
     """
     warehouse.require()
+    purges.note_all(warehouse)  # of purges from before receipts were kept twice
     return tuple(name for name in TABLES if with_retry(partial(_one, warehouse, name, more_files_than)))
 
 
@@ -87,16 +88,19 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
     from deltalake import WriterProperties
 
     table = delta.open_table(warehouse, name)
-    if table is None or len(table.file_uris()) <= more_files_than:
+    if table is None:
         return False
-    written = WriterProperties(compression="ZSTD", max_row_group_size=delta.ROW_GROUP)
+    written.note(warehouse, name)  # of tables from before that was kept
+    if len(table.file_uris()) <= more_files_than:
+        return False
+    properties = WriterProperties(compression="ZSTD", max_row_group_size=delta.ROW_GROUP)
     sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
     with delta.refusals_as_errors(warehouse.address(name)):
         removed = 0
         if name in _SMALL and sortable:
-            removed = table.optimize.z_order(["vessel_key"], writer_properties=written)["numFilesRemoved"]
+            removed = table.optimize.z_order(["vessel_key"], writer_properties=properties)["numFilesRemoved"]
         elif name in (*_SMALL, *_LARGE):
-            removed = table.optimize.compact(writer_properties=written)["numFilesRemoved"]
+            removed = table.optimize.compact(writer_properties=properties)["numFilesRemoved"]
         if warehouse.size_of(name, "_delta_log", f"{table.version():020d}.checkpoint.parquet") is None:
             table.create_checkpoint()
         seals.seal(table)
@@ -151,7 +155,10 @@ def vacuum(
     named = pinned(warehouse)
     opened = {name: delta.open_table(warehouse, name) for name in TABLES}
     tables = {name: table for name, table in opened.items() if table is not None}
-    kept = {name: _kept(table, name, named.get(name, ()), older_than_hours) for name, table in tables.items()}
+    kept = {
+        name: _kept(table, name, named.get(name, ()), older_than_hours, anew=written.was_made_anew(warehouse, name))
+        for name, table in tables.items()
+    }
     cleared = [
         _vacuumed(warehouse, name, tables[name], kept[name], older_than_hours, dry_run=dry_run) for name in tables
     ]
@@ -168,6 +175,7 @@ def _half_written(warehouse: Warehouse, older_than_hours: float) -> list[Path]:
         return []
     before = datetime.now(UTC).timestamp() - 3600.0 * older_than_hours
     passing = (*warehouse.folder.glob(".*.*"), *warehouse.folder.glob("raw/*/.*.*"))
+    passing += tuple(warehouse.folder.glob(f"{written.FOLDER}/.*.*"))
     return sorted(path for path in passing if path.is_file() and path.stat().st_mtime < before)
 
 
@@ -191,10 +199,12 @@ def _vacuumed(
     return Cleared(name, len(there), sum(there), len(keep))
 
 
-def _kept(table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours: float) -> tuple[int, ...]:
+def _kept(
+    table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours: float, *, anew: bool
+) -> tuple[int, ...]:
     newest = table.version()
     ahead = [version for version in named if not 0 <= version <= newest]
-    if ahead:
+    if ahead and not anew:
         raise KempfError(
             "version_lost",
             f"Parameter sets were made from versions {', '.join(map(str, ahead))} of the table {name}, which has "
@@ -208,4 +218,4 @@ def _kept(table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours
     since = (datetime.now(UTC) - timedelta(hours=older_than_hours)).timestamp() * 1000.0
     # also the one that was the newest when that time began: work that began then rests on it, and may not have said so
     first = max(bisect_right(times, since) - 1, 0)
-    return tuple(sorted({*range(first, newest + 1), *named}))
+    return tuple(sorted({*range(first, newest + 1), *named} - set(ahead)))

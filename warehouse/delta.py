@@ -19,7 +19,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.tables import TABLES, arrow_schema
-from kempf.warehouse import seals, table_cache
+from kempf.warehouse import seals, table_cache, written
 from kempf.warehouse.scan import Where, scanned
 from kempf.warehouse.store import Warehouse, not_writable
 
@@ -39,6 +39,8 @@ _BATCH_ROWS = 16_384
 
 #: Rows that are skipped or read together, of tables in which one vessel is looked for among all.
 ROW_GROUP = 8192
+#: attribute of a handle: that its table was written is kept beside the tables
+_NOTED = "kempf_noted"
 #: What commits that bring a table to a later layout say of themselves: the version before the first of them.
 BROUGHT = "kempf_brought_from"
 
@@ -67,8 +69,36 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
     NotFound
         ``no_table_version``: the table has no such version.
     KempfError
-        ``table_unreadable``: its log or its storage is damaged.
+        ``table_unreadable``: its log or its storage is damaged; ``table_damaged``: so are its files, or it was written
+        and is lost whole.
     """
+    table = _opened(warehouse, name, version)
+    if table is None and written.is_noted(warehouse, name):
+        table = _opened(warehouse, name, version)  # where another writer made it between the two looks
+        if table is None:
+            raise _gone(name)
+    return table
+
+
+def is_gone(warehouse: Warehouse, name: str) -> bool:
+    """Return whether a table was written and is lost whole; not where it cannot be opened for another reason."""
+    try:
+        open_table(warehouse, name)
+    except KempfError as error:
+        return error.code == "table_damaged" and error.details.get("what") == "table"
+    return False
+
+
+def _gone(name: str) -> KempfError:
+    return KempfError(
+        "table_damaged",
+        f"The table {name} is gone: it was written, and its folder or its log is not there any more.",
+        "See with `kempf verify` what else is damaged and lost; `kempf repair` makes again what can be made.",
+        {"table": name, "path": name, "what": "table"},
+    )
+
+
+def _opened(warehouse: Warehouse, name: str, version: int | None) -> DeltaTable | None:
     from deltalake import DeltaTable
     from deltalake.exceptions import DeltaError, TableNotFoundError
 
@@ -143,12 +173,20 @@ def _no_version(name: str, version: int | None, newest: int) -> NotFound:
 
 def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
     """Open a table for writing; make it, and the warehouse, where they are not there."""
+    table = open_table(warehouse, name)
+    return table if table is not None else _made(warehouse, name)
+
+
+def make_anew(warehouse: Warehouse, name: str) -> None:
+    """Make a table that is lost whole, without rows."""
+    written.note_anew(warehouse, name)
+    _made(warehouse, name)
+
+
+def _made(warehouse: Warehouse, name: str) -> DeltaTable:
     from deltalake import DeltaTable
     from deltalake.exceptions import DeltaError
 
-    table = open_table(warehouse, name)
-    if table is not None:
-        return table
     warehouse.create()
     with refusals_as_errors(warehouse.address(name)):
         try:
@@ -180,6 +218,9 @@ def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     with table_cache.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
         seals.compare_log(table, name)
+        if _NOTED not in vars(table):
+            written.note(warehouse, name)
+            vars(table)[_NOTED] = True
         # here, and not where it is opened: a handle that was lent for reading before may lack columns too
         yield _with_every_column(warehouse, table, name)
 

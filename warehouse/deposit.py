@@ -36,6 +36,8 @@ class Delivery:
     readings: LogReadings
     #: Of the code that read it: stage ``ingest`` of `kempf.warehouse.code_version`.
     code_version: str
+    #: Why it counts no longer, of one that was removed and is taken in again as that; None where it counts.
+    removed: str | None = None
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,8 @@ def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposi
 def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) -> tuple[logs.LogRow, ...]:
     if not fresh:
         return ()
-    vessels.register_all(warehouse, [(delivery.vessel, delivery.profile) for delivery, _ in fresh])
+    counting = [delivery for delivery, _ in fresh if delivery.removed is None]
+    vessels.register_all(warehouse, [(delivery.vessel, delivery.profile) for delivery in counting])
     batch = [(row, delivery.readings) for delivery, row in fresh]
     readings.write(warehouse, batch)
     readings.write_rejected(warehouse, batch)
@@ -179,6 +182,7 @@ def _row(delivery: Delivery) -> logs.LogRow:
         end_utc_ns=until,
         tally=delivery.readings.tally,
         notes=delivery.readings.notes,
+        removed=delivery.removed,
     )
 
 

@@ -1,17 +1,24 @@
-"""Logs that were deleted for good: the receipts. Nothing takes one back."""
+"""Logs that were deleted for good: the receipts. Nothing takes one back.
+
+Each is kept twice, in its table and where the raw log was, so that a log is not let in again where the table is lost.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse import append_only, delta
+from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
 
 _TABLE = "purges"
+#: How what is kept where a raw log was ends, behind the id of the log.
+NOTE = ".purged.json"
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,31 @@ class Purge:
 def add(warehouse: Warehouse, purge: Purge) -> None:
     """Write a receipt."""
     append_only.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
+
+
+def note_all(warehouse: Warehouse) -> None:
+    """Keep every receipt where its raw log was, too, as far as that is not done."""
+    for log_id, purge in of_logs(warehouse).items():
+        content = canonical_json(asdict(purge)).encode()
+        if warehouse.read_bytes(*_place(log_id)) != content:
+            warehouse.write_bytes(content, *_place(log_id))
+
+
+def noted(warehouse: Warehouse) -> dict[str, Purge]:
+    """Return the receipts that are kept where the raw logs were, by log, sorted; a damaged one is left out."""
+    receipts = {}
+    for name in warehouse.files_below("raw"):
+        if name.endswith(NOTE) and not name.startswith("."):
+            data = warehouse.read_bytes(*_place(name.removesuffix(NOTE)))
+            try:
+                receipts[name.removesuffix(NOTE)] = Purge(**json.loads(data or b""))
+            except (ValueError, TypeError):
+                continue
+    return receipts
+
+
+def _place(log_id: str) -> tuple[str, ...]:
+    return "raw", log_id[:2], f"{log_id}{NOTE}"
 
 
 def of_logs(warehouse: Warehouse, log_ids: Collection[str] | None = None) -> dict[str, Purge]:

@@ -130,14 +130,18 @@ def is_half_described(warehouse: Warehouse, name: str) -> bool:
 
 
 def delete(warehouse: Warehouse, name: str) -> None:
-    """Delete a log, what is kept beside it, and what writers of it that were killed left behind."""
+    """Delete a log, what is kept beside it, and what writers of it that were killed left behind; no receipt of that."""
     for file in left_of(warehouse, name):
         warehouse.delete(*_place(name)[:-1], file)
 
 
 def left_of(warehouse: Warehouse, name: str) -> list[str]:
-    """Return the names of the files of a log: its bytes, what is kept beside them, what killed writers left behind."""
-    return [file for file in warehouse.files_below(*_place(name)[:-1]) if name in file]
+    """Return the names of the files of a log: its bytes, what is kept beside them, what killed writers left behind.
+
+    The receipt of a purge is not among them.
+    """
+    files = warehouse.files_below(*_place(name)[:-1])
+    return [file for file in files if name in file and file != f"{name}{purges.NOTE}"]
 
 
 def kept(warehouse: Warehouse) -> list[str]:

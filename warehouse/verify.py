@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,8 +10,10 @@ from typing import Any, Literal
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, logs, raw, seals, vessels
+from kempf.warehouse import aliases, delta, logs, purges, raw, seals, vessels
 from kempf.warehouse.deposit import description
+from kempf.warehouse.equivalents import code_of
+from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
 #: where a repair keeps damaged files aside, below the warehouse, and what it has still to do where it was cut off
@@ -33,6 +36,8 @@ class Problem:
     words: str
     #: Whether the newest version of the table is not touched by it: only what was known earlier cannot be read.
     past: bool = False
+    #: What helps where `kempf repair` does not, one sentence; None where it does.
+    next_step: str | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
@@ -40,6 +45,8 @@ class Problem:
 
 
 Look = Callable[[str], None]
+
+_ORIGINAL = "Ingest the original file again."
 
 
 def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem]:
@@ -79,16 +86,19 @@ def _raw(warehouse: Warehouse, look: Look) -> Iterator[Problem]:
     for name in raw.kept(warehouse):
         look(f"raw log {name[:12]}")
         if not raw.is_whole(warehouse, name):
-            yield Problem("raw log", "raw", name, f"The raw log {name} is damaged: its bytes do not have this hash.")
+            words = f"The raw log {name} is damaged: its bytes do not have this hash."
+            yield Problem("raw log", "raw", name, words, next_step=_ORIGINAL)
 
 
 def damages(warehouse: Warehouse, name: str) -> list[Problem]:
     """Return what is damaged of one table, that which its newest version rests on first."""
+    if delta.is_gone(warehouse, name):
+        return [Problem("table", name, name, f"The table {name} is gone.")]
     if warehouse.folder is None:
         return _readable(warehouse, name)
     folder = warehouse.folder / name
     if not (folder / "_delta_log").is_dir():
-        lost = seals.sealed_versions(folder)
+        lost = seals.sealed_versions(folder)  # of a table that nobody has written to since its loss is noticed
         return [Problem("table", name, name, f"The table {name} is gone.")] if lost else []
     newest = max(seals.sealed_versions(folder), default=-1)
     problems = [_problem(damage) for damage in seals.damages_of_log(folder, name, newest)]
@@ -147,32 +157,69 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
     rows = column("logs", "log_id", "ingest_id", "profile_sha256", "vessel")
     kept = set(raw.kept(warehouse))
     log_ids = {row[0] for row in rows or ()}
-    purged = _values_of(warehouse, "purges", "log_id")
+    noted = purges.noted(warehouse)
+    purged = _values_of(warehouse, "purges", "log_id") | noted.keys()
     for log_id in sorted(log_ids - kept - purged):
-        yield Problem("reference", "logs", log_id, f"The log {log_id} is not kept as delivered.")
-    profiles = {row[0] for row in column("vessels", "profile_sha256") or ()}
-    for hash_ in sorted({row[2] for row in rows or ()} - profiles):
+        yield Problem("reference", "logs", log_id, f"The log {log_id} is not kept as delivered.", next_step=_ORIGINAL)
+    profiles = column("vessels", "profile_sha256")
+    for hash_ in sorted({row[2] for row in rows or ()} - {row[0] for row in profiles}) if profiles is not None else ():
         yield Problem("reference", "vessels", hash_, f"The profile {hash_} that logs were read with is lost.")
-    ingests = {row[1] for row in rows or () if row[0] not in purged}
+    yield from _receipts(warehouse, noted)
     yield from _half_purged(warehouse, purged & kept, {row[1]: row[0] for row in rows or () if row[0] in purged})
-    for name in ("readings", "examinations"):
-        held = _ingests_of(warehouse, name)
-        if held is not None and rows is not None:
-            for ingest in sorted(ingests - held):
-                yield Problem("reference", name, ingest, f"Of the ingest {ingest} there is nothing in {name}.")
+    yield from _of_ingests(warehouse)
     sets = column("parameter_sets", "parameter_set_id")
     if rows is not None and sets is not None:
-        yield from _of_sets(warehouse, log_ids, {row[0] for row in sets})
-    known = set() if rows is None else {*log_ids}
-    for log_id in sorted(kept - known) if rows is not None else ():
+        yield from _of_sets(warehouse, log_ids | purged, {row[0] for row in sets})
+    for log_id in sorted(kept - log_ids - purged) if rows is not None else ():
         facts = raw.described(warehouse, log_id)
-        if facts is not None and not facts.get("removed"):
+        if facts is not None:
             words = f"The raw log {log_id} ({facts['file_name']} of {facts['vessel']}) is in no table."
             yield Problem("reference", "logs", log_id, words)
         if raw.is_half_described(warehouse, log_id):
             words = f"The raw log {log_id} is in no table, and what is kept beside it is damaged."
-            yield Problem("raw log", "raw", f"{log_id}.json", words)
+            yield Problem("raw log", "raw", f"{log_id}.json", words, next_step=_ORIGINAL)
     yield from _descriptions(warehouse)
+
+
+def ingests_to_hold(warehouse: Warehouse) -> tuple[list[LogRow], list[LogRow]]:
+    """Return the ingests of which the tables must hold what the bytes of the logs gave, and those they need not.
+
+    They must of what counts now, whatever code read it, and of all that the present code reads from the bytes again: a
+    log that was removed may be restored. What earlier code read of other logs nobody can make again, and nobody needs.
+    Those of purged logs are in neither.
+    """
+    code = code_of(warehouse, "ingest")
+    purged = purges.of_logs(warehouse)
+    ingests = {row.ingest_id: row for row in logs.all_ingests(warehouse) if row.log_id not in purged}
+    counting = {row.ingest_id for row in logs.current(warehouse)}
+    must = [row for name, row in ingests.items() if name in counting or row.code_version == code]
+    return must, [row for name, row in ingests.items() if name not in counting and row.code_version != code]
+
+
+def _of_ingests(warehouse: Warehouse) -> Iterator[Problem]:
+    """Yield the ingests of which a table that must hold something holds nothing."""
+    try:
+        must, _ = ingests_to_hold(warehouse)
+        code = code_of(warehouse, "ingest")
+    except Exception:  # noqa: BLE001 - it is reported as damaged already
+        return
+    for name in ("readings", "examinations"):
+        held = _ingests_of(warehouse, name)
+        if held is None:
+            continue
+        for row in sorted(must, key=lambda row: row.ingest_id):
+            if row.ingest_id not in held:
+                words = f"Of the ingest {row.ingest_id} there is nothing in {name}."
+                by_others = row.code_version != code
+                what = "It was read by earlier code: `kempf reprocess` reads the log again." if by_others else None
+                yield Problem("reference", name, row.ingest_id, words, next_step=what)
+
+
+def _receipts(warehouse: Warehouse, noted: Iterable[str]) -> Iterator[Problem]:
+    """Yield the purges of which the receipt is kept where the raw log was, and is not in its table."""
+    for log_id in sorted(set(noted) - _values_of(warehouse, "purges", "log_id")):
+        words = f"The receipt of the purge of the log {log_id} is lost: the log would be taken in again."
+        yield Problem("reference", "purges", log_id, words)
 
 
 def _half_purged(warehouse: Warehouse, kept: set[str], ingests: dict[str, str]) -> Iterator[Problem]:
@@ -180,7 +227,7 @@ def _half_purged(warehouse: Warehouse, kept: set[str], ingests: dict[str, str]) 
     there = {ingests[ingest] for ingest in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
     for log_id in sorted(kept | there):
         words = f"Of the purged log {log_id} something is still there: `kempf purge {log_id[:12]}` goes on."
-        yield Problem("reference", "purges", log_id, words)
+        yield Problem("reference", "purges", log_id, words, next_step=f"`kempf purge {log_id[:12]}` deletes it.")
 
 
 def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:
@@ -198,13 +245,32 @@ def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:
 
 
 def _of_sets(warehouse: Warehouse, log_ids: set[str], set_ids: set[str]) -> Iterator[Problem]:
-    for name, column, kind, there in (
-        ("parameter_sets", "log_ids", "log", log_ids),
-        ("aliases", "parameter_set_id", "parameter set", set_ids),
-        ("diagnoses", "parameter_set_id", "parameter set", set_ids),
-    ):
-        for value in sorted(_values_of(warehouse, name, column) - there):
-            yield Problem("reference", name, value, f"The {kind} {value} that {name} refer to is lost.")
+    """Yield the logs that sets rest on and the sets that names point to which are lost.
+
+    A diagnosis says all that it found by itself.
+    """
+    for value in sorted(_values_of(warehouse, "parameter_sets", "log_ids") - log_ids):
+        words = f"The log {value} that parameter_sets refer to is lost."
+        yield Problem("reference", "parameter_sets", value, words, next_step=_ORIGINAL)
+    try:
+        pointed = aliases.every(warehouse)
+    except Exception:  # noqa: BLE001 - it is reported as damaged already
+        return
+    for (vessel, alias), value in pointed.items():
+        if value in set_ids:
+            continue
+        words = f"The parameter set {value} that aliases refer to is lost."
+        if alias in (aliases.CURRENT, aliases.WITHDRAWN):
+            words += f" It was the current model of {vessel!r}."
+            what = (
+                "`kempf reprocess` cannot know which effects it had: choose another set with `kempf params alias "
+                f"current ID --vessel {shlex.quote(vessel)}` (where there is none, after `kempf reprocess`), then add "
+                "them again with `kempf effects add`."
+            )
+        else:
+            words += f" It was {alias!r} of {vessel!r}."
+            what = f"Choose another set with `kempf params alias {alias} ID --vessel {shlex.quote(vessel)}`."
+        yield Problem("reference", "aliases", value, words, next_step=what)
 
 
 def _values_of(warehouse: Warehouse, name: str, column: str) -> set[str]:

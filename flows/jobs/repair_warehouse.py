@@ -2,35 +2,49 @@
 
 Commits are put back from their copies. Data files that are not what was written are taken out of their table and kept
 aside; what they held of logs is read again from the raw bytes, registers of logs and vessels are made again from what
-is kept beside these. What people said (corrections, notes, aliases) and parameter sets of earlier code cannot be made
-again, and are counted.
+is kept beside these. A table that is lost whole is made anew, and filled so. What people said (corrections, notes,
+aliases) and parameter sets of earlier code cannot be made again, and are counted.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+import shlex
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from kempf.flows.jobs import search_log
-from kempf.flows.jobs.ingest_logs import ingest_log, look_through
+from kempf.flows.jobs.ingest_logs import ingest_log, look_through, store
 from kempf.flows.jobs.spool import spooled
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError
 from kempf.schemas.instants import month_of
 from kempf.schemas.profile import parse
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import corrections, delta, logs, lost, raw, readings, seals, vessels
+from kempf.warehouse import (
+    aliases,
+    corrections,
+    delta,
+    logs,
+    lost,
+    parameter_sets,
+    purges,
+    raw,
+    readings,
+    seals,
+    vessels,
+)
 from kempf.warehouse.deposit import describe_all
 from kempf.warehouse.equivalents import code_of, codes_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.migrations.chain import repair_marker
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, verify
+from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, ingests_to_hold, verify
 
 #: tables whose rows come of the bytes of a log and of nothing else
 _OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")
@@ -49,6 +63,10 @@ class Repaired:
     #: stands for all of them.
     months: set[str] = field(default_factory=set)
     vessel_keys: set[str | None] = field(default_factory=set)
+    #: How much of the parameter sets is lost, such as "2 rows of the table parameter_sets".
+    sets: list[str] = field(default_factory=list)
+    #: Whether names of parameter sets are lost.
+    names: bool = False
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
     registers: bool = False
 
@@ -70,17 +88,26 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
         outcome.done.append("The file that marks the warehouse was written anew.")
     warehouse.require()
     _recall(warehouse, outcome)
-    if warehouse.folder is not None:
-        for name in TABLES:
-            progress(0, 1, f"table {name}")
-            try:
+    for name in TABLES:
+        progress(0, 1, f"table {name}")
+        try:
+            if warehouse.folder is not None:
                 _table(warehouse, warehouse.folder / name, name, outcome)
-            except KempfError as error:  # the other tables are repaired all the same
-                outcome.gone.append(f"the table {name}: {error.message}")
+            if delta.is_gone(warehouse, name):
+                _made_anew(warehouse, name, outcome)
+        except KempfError as error:  # the other tables are repaired all the same
+            outcome.gone.append(f"the table {name}: {error.message}")
+    _receipts(warehouse, outcome)
     _profiles(warehouse, outcome)
     _removed_again(warehouse, outcome)
-    _each(warehouse, outcome, progress, _missing_logs(warehouse, outcome), _taken_in)
-    _each(warehouse, outcome, progress, _unread_logs(warehouse, outcome), _read_again)
+    missing, present = _missing_logs(warehouse, outcome), vessels.profiles(warehouse)
+    _each(warehouse, outcome, progress, missing, _taken_in, "log")
+    if missing:
+        # what was current stays so, also where a log was last read with an earlier profile
+        vessels.register_all(warehouse, list(present.items()))
+        _profiles(warehouse, outcome)  # of those that were taken in again as removed ones
+    unread = _unread_ingests(warehouse, outcome, frozenset(missing))
+    _each(warehouse, outcome, progress, unread, _read_again, "log of the ingest")
     describe_all(warehouse)
     if not _unread_left(outcome):
         warehouse.delete(*UNFINISHED)
@@ -88,6 +115,9 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     outcome.gone += [
         f"{problem.words} Ingest the original file again." for problem in outcome.left if problem.kind == "raw log"
     ]
+    _sets_lost(outcome)
+    if outcome.names:
+        _say_models(warehouse, outcome)
     return outcome
 
 
@@ -96,7 +126,7 @@ def _table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> 
     if not folder.is_dir():
         return
     outcome.done += seals.repair_log(folder, name)
-    if not (folder / "_delta_log").is_dir():
+    if not (folder / "_delta_log").is_dir() or delta.is_gone(warehouse, name):
         return
     table = delta.open_table(warehouse, name)
     if table is None:
@@ -115,8 +145,7 @@ def _table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> 
             count = rows.get(path.name)
             amount = f"{count} rows" if count is not None else "rows"
             outcome.done.append(f"{name}/{path.relative_to(folder).as_posix()} was taken out of its table.")
-            if name not in _OF_LOGS and name != "logs":
-                outcome.gone.append(f"{amount} of the table {name}{_AFTER.get(name, '')}")
+            _say_lost(f"{amount} of the table {name}", name, outcome)
         else:
             outcome.gone.append(
                 f"what the table {name} held earlier in {path.name}; the newest version does not need it"
@@ -137,6 +166,60 @@ def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, outcome
         outcome.months.add(f"{parts['vessel_key']} {parts['month']}")
     else:
         outcome.vessel_keys.add(parts.get("vessel_key"))
+    _keep_unfinished(warehouse, outcome)
+
+
+def _made_anew(warehouse: Warehouse, name: str, outcome: Repaired) -> None:
+    """Make a table that is lost whole, without rows; what logs gave of it is read again after."""
+    outcome.registers |= name == "logs"
+    if name in _OF_LOGS:
+        outcome.vessel_keys.add(None)
+    if name in (*_OF_LOGS, "logs"):
+        _keep_unfinished(warehouse, outcome)  # first, as with single files
+    delta.make_anew(warehouse, name)
+    outcome.done.append(f"The table {name} was gone, and was made anew.")
+    _say_lost(f"the table {name}", name, outcome)
+
+
+def _say_lost(what: str, name: str, outcome: Repaired) -> None:
+    """Say that rows of a table are lost that no log gives again."""
+    outcome.names |= name == "aliases"
+    if name == "parameter_sets":
+        outcome.sets.append(what)
+    elif name not in _OF_LOGS and name != "logs":
+        outcome.gone.append(f"{what}{_AFTER.get(name, '')}")
+
+
+def _sets_lost(outcome: Repaired) -> None:
+    """Say which parameter sets come again; of those that names point to nobody knows what they were made with."""
+    named = any(problem.table == "aliases" and problem.kind == "reference" for problem in outcome.left)
+    which = " that no name points to" if named else ""
+    for what in outcome.sets:
+        outcome.gone.append(f"{what}: those of the present code{which} are made again by `kempf reprocess`")
+
+
+def _say_models(warehouse: Warehouse, outcome: Repaired) -> None:
+    """Name of every vessel without a current set the last one with effects: `kempf reprocess` chooses a plain one."""
+    try:
+        sets = parameter_sets.summaries(warehouse)
+        effects = parameter_sets.specifications(warehouse, sets["parameter_set_id"].to_list())
+        times = parameter_sets.stored_at_ms(warehouse)
+        current = aliases.holders(warehouse, aliases.CURRENT)
+    except KempfError:
+        return  # it is named as what is still wrong
+    last: dict[str, str] = {}
+    for vessel, name in sorted(sets.select("vessel", "parameter_set_id").rows(), key=lambda row: times.get(row[1], 0)):
+        if effects[name].get("effects") and vessel not in current:
+            last[vessel] = name
+    for vessel, name in sorted(last.items()):
+        outcome.gone.append(
+            f"which set was the current one of {vessel!r}: her last one with effects is {name} "
+            f"({', '.join(effects[name]['effects'])}); `kempf params alias current {name} --vessel "
+            f"{shlex.quote(vessel)}` before `kempf reprocess` points to it"
+        )
+
+
+def _keep_unfinished(warehouse: Warehouse, outcome: Repaired) -> None:
     content = {
         "months": sorted(outcome.months),
         "vessel_keys": sorted(outcome.vessel_keys, key=str),
@@ -157,10 +240,15 @@ def _recall(warehouse: Warehouse, outcome: Repaired) -> None:
 
 _AFTER = {
     "vessels": ": profiles are made again from what is kept beside the raw logs",
-    "parameter_sets": ": those of the present code are made again by `kempf reprocess`",
-    "aliases": ": which set is current is chosen anew by `kempf reprocess`",
+    "aliases": (
+        ": which set is current is chosen anew by `kempf reprocess`, which cannot know the effects of a model; named "
+        "aliases are lost, give them again with `kempf params alias NAME ID`"
+    ),
     "diagnoses": ": `kempf diagnose` makes them again",
     "diagnosis_evidence": ": `kempf diagnose` makes them again",
+    "purges": ": receipts are made again as far as they are kept beside the raw logs",
+    "equivalents": ": code that was adopted has to be adopted again with `kempf rerun --all --adopt`",
+    "run_history": ": what earlier runs did is not known any more",
     "runs": ": vessels are looked at once more",
     "inbox": ": files are looked at once more",
     "corrections": ": what people said of manoeuvres has to be said again",
@@ -208,14 +296,15 @@ def _each(
     progress: Progress,
     names: Sequence[str],
     repair_one: Callable[[Warehouse, str], str],
+    noun: str,
 ) -> None:
-    """Repair logs one by one; one that cannot be stops no other."""
+    """Repair logs one by one; one that cannot be stops no other. They are named by a noun that begins with `log`."""
     for done, name in enumerate(names):
-        progress(done, len(names), f"log {name[:12]}")
+        progress(done, len(names), f"{noun} {name[:12]}")
         try:
             outcome.done.append(repair_one(warehouse, name))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-            outcome.gone.append(f"the log {name}: {wrapped(error).message}")
+            outcome.gone.append(f"the {noun} {name}: {wrapped(error).message}")
 
 
 def _removed_again(warehouse: Warehouse, outcome: Repaired) -> None:
@@ -230,12 +319,30 @@ def _removed_again(warehouse: Warehouse, outcome: Repaired) -> None:
             outcome.done.append(f"{row.file_name} of {row.vessel} counts no longer, as before: {reason}.")
 
 
+def _receipts(warehouse: Warehouse, outcome: Repaired) -> None:
+    """Put the receipts of purges back into their table, and where the raw logs were."""
+    held = purges.of_logs(warehouse)
+    for log_id, purge in purges.noted(warehouse).items():
+        if log_id not in held:
+            purges.add(warehouse, purge)
+            outcome.done.append(f"The receipt of the purge of {purge.file_name} of {purge.vessel} was put back.")
+    purges.note_all(warehouse)
+
+
 def _missing_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:
-    """Return the raw logs that should count, by what is kept beside them, and that no register lets count."""
-    current = {row.log_id for row in logs.current(warehouse)}
-    known = current if outcome.registers else {row.log_id for row in logs.all_ingests(warehouse)}
-    described = {name: raw.described(warehouse, name) for name in raw.kept(warehouse) if name not in known}
-    return [name for name, facts in described.items() if facts is not None and not facts.get("removed")]
+    """Return the raw logs that no register has, and those that should count and that none lets count.
+
+    What is kept beside them says whether they count. Purged ones are left out: they go on being deleted.
+    """
+    recorded = {row.log_id for row in logs.all_ingests(warehouse)}
+    known = {row.log_id for row in logs.current(warehouse)} if outcome.registers else recorded
+    left_out = known | purges.of_logs(warehouse).keys()
+    described = {name: raw.described(warehouse, name) for name in raw.kept(warehouse) if name not in left_out}
+    return [
+        name
+        for name, facts in described.items()
+        if facts is not None and (not facts.get("removed") or name not in recorded)
+    ]
 
 
 def _taken_in(warehouse: Warehouse, name: str) -> str:
@@ -243,9 +350,18 @@ def _taken_in(warehouse: Warehouse, name: str) -> str:
     facts = raw.described(warehouse, name)
     assert facts is not None
     profile = parse(facts["profile"], f"raw/{name}.json")
+    vessel, file_name, removed = facts["vessel"], facts["file_name"], facts.get("removed")
     with raw.opened(warehouse, name) as log:
-        outcome = ingest_log(warehouse, facts["vessel"], facts["file_name"], log, profile, facts["file_name"])
-    return f"{facts['file_name']} of {facts['vessel']} was taken in again from its raw bytes ({outcome.outcome})."
+        if not removed:
+            outcome = ingest_log(warehouse, vessel, file_name, log, profile, file_name).outcome
+        else:
+            with spooled(file_name, log, profile) as read:
+                said = corrections.of_logs(warehouse, [name]).get(name, ())
+                found = look_through(vessel, file_name, log, profile, read, said, codes_of(warehouse))
+                # in one row, so that it never counts in between
+                store(warehouse, [replace(found, delivery=replace(found.delivery, removed=removed))])
+            outcome = f"removed, as before: {removed}"
+    return f"{file_name} of {vessel} was taken in again from its raw bytes ({outcome})."
 
 
 def _profiles(warehouse: Warehouse, outcome: Repaired) -> None:
@@ -267,10 +383,12 @@ def _profiles(warehouse: Warehouse, outcome: Repaired) -> None:
         outcome.done.append(f"Profiles were registered again: {', '.join(sorted({row.vessel for row in lost}))}.")
 
 
-def _unread_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:
-    """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
+def _unread_ingests(warehouse: Warehouse, outcome: Repaired, taken_in: Collection[str]) -> list[str]:
+    """Return the ingests of which something that the bytes gave is missing, and that the present code has read.
+
+    Logs that were taken in again just now are whole.
+    """
     code = code_of(warehouse, "ingest")
-    rows = [row for row in logs.current(warehouse) if row.code_version == code]
     held = delta.distinct(warehouse, "readings", "ingest_id")
     examined = delta.distinct(warehouse, "examinations", "ingest_id")
 
@@ -278,9 +396,15 @@ def _unread_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:
         key = vessel_key(row.vessel)
         touched = f"{key} {month_of(row.start_utc_ns)}" in outcome.months
         touched = touched or not outcome.vessel_keys.isdisjoint({None, key})
+        touched = touched and row.log_id not in taken_in
         return not touched and row.ingest_id in held and row.ingest_id in examined
 
-    return [row.log_id for row in rows if not whole(row)]
+    must, others = ingests_to_hold(warehouse)
+    touched = [row for row in others if not whole(row)]
+    if touched:
+        words = "what earlier code had read of logs that were removed or read again since"
+        outcome.gone.append(f"{words} ({counted(len(touched), 'ingest')}); nothing needs it")
+    return [row.ingest_id for row in must if row.code_version == code and not whole(row)]
 
 
 def _unread_left(outcome: Repaired) -> bool:
@@ -289,17 +413,20 @@ def _unread_left(outcome: Repaired) -> bool:
 
 
 def _read_again(warehouse: Warehouse, name: str) -> str:
-    """Read a log again and put all that its bytes give in place of what is stored of it."""
-    row = logs.by_prefix(warehouse, name)
+    """Read the log of an ingest again and put all that its bytes give in place of what is stored of it."""
+    row = logs.of_ingest(warehouse, name)
     profile = vessels.get(warehouse, row.profile_sha256)
-    log_corrections = corrections.of_logs(warehouse, [name]).get(name, ())
-    with raw.opened(warehouse, name) as log, spooled(row.file_name, log, profile) as read:
+    log_corrections = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
+    with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as read:
         looked_through = look_through(
             row.vessel, row.file_name, log, profile, read, log_corrections, codes_of(warehouse)
         )
         if looked_through.found.examination.ingest_id != row.ingest_id:
             raise KempfError(
-                "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}
+                "other_ingest",
+                f"{row.file_name} is read with other code now.",
+                "Run `kempf reprocess`.",
+                {"log": row.log_id},
             )
         search_log.store(warehouse, [looked_through.found])
         batch = [(row, read)]

@@ -81,7 +81,9 @@ def test_nothing_that_was_measured_is_left_in_any_version(warehouse: Warehouse) 
     assert (receipt.log_id, receipt.readings, receipt.evidence) == (row.log_id, rows, 1)
     assert purges.of_logs(warehouse) == {row.log_id: receipt}
     assert held(warehouse, mine) == [] and raw.kept(warehouse) == [other.log_id]
-    assert warehouse.folder is not None and not list(warehouse.folder.rglob(f"{row.log_id}*"))
+    assert warehouse.folder is not None
+    # the receipt alone is kept where the log was
+    assert [path.name for path in warehouse.folder.rglob(f"{row.log_id}*")] == [f"{row.log_id}{purges.NOTE}"]
     assert delta.read(warehouse, "diagnosis_evidence").height == 0 and diagnoses.find(warehouse, "dx-1") is not None
     # the other log is whole, and so is what was made of it
     assert readings.read(warehouse, other.ingest_id).equals(kept)

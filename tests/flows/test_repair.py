@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from shutil import copytree, rmtree
 from typing import Any
@@ -12,10 +13,26 @@ import pytest
 from kempf.flows.jobs.correct_segments import plan_for
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.purge_logs import purge
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, restore
 from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.warehouse import aliases, corrections, logs, parameter_sets, raw, segments, table_cache, vessels
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import (
+    aliases,
+    compaction,
+    corrections,
+    delta,
+    logs,
+    notes,
+    parameter_sets,
+    purges,
+    raw,
+    segments,
+    table_cache,
+    vessels,
+)
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
 from tests.conftest import Ship
@@ -66,11 +83,28 @@ def files(warehouse: Warehouse, table: str) -> list[Path]:
     return sorted(p for p in (warehouse.folder / table).rglob("*.parquet") if "_delta_log" not in p.parts)
 
 
-@pytest.mark.parametrize("table", ["readings", "rejected", "examinations", "segments", "logs", "vessels"])
-def test_what_logs_gave_is_made_again_from_their_bytes(warehouse: Warehouse, table: str) -> None:
+def lose(warehouse: Warehouse, *tables: str) -> None:
+    """Take whole tables away, with their seals."""
+    assert warehouse.folder is not None
+    for table in tables:
+        rmtree(warehouse.folder / table)
+    table_cache._kept.clear()
+
+
+OF_LOGS = ("readings", "rejected", "examinations", "segments", "logs", "vessels")
+
+
+@pytest.mark.parametrize(("table", "whole"), [(table, whole) for table in OF_LOGS for whole in (False, True)])
+def test_what_logs_gave_is_made_again_from_their_bytes(warehouse: Warehouse, table: str, whole: bool) -> None:
     wanted = content(warehouse)
-    for path in files(warehouse, table):
-        flipped(path)
+    if whole:
+        lose(warehouse, table)
+        assert f"The table {table} is gone." in [one.words for one in verify(warehouse)]
+        with pytest.raises(KempfError, match=f"The table {table} is gone: it was written"):
+            delta.read(warehouse, table)
+    else:
+        for path in files(warehouse, table):
+            flipped(path)
     named = verify(warehouse)
     assert any(one.table == table and not one.past for one in named)
     refused = kempf("verify", "--warehouse", warehouse.uri, "--json")
@@ -88,7 +122,87 @@ def test_what_logs_gave_is_made_again_from_their_bytes(warehouse: Warehouse, tab
         last = [[{**row, "revision": 0} for row in one[name]][-2:] for one in (found, wanted)]
         assert last[0] == last[1]
     assert verify(warehouse) == []
-    assert warehouse.folder is not None and list((warehouse.folder / "damaged" / table).iterdir())
+    assert warehouse.folder is not None
+    assert whole or list((warehouse.folder / "damaged" / table).iterdir())
+
+
+def test_what_no_log_gives_is_said_where_its_table_is_lost_and_then_all_is_well(warehouse: Warehouse) -> None:
+    (current,) = [parameter_sets.get(warehouse, name) for name in aliases.of_vessel(warehouse, "ferry").values()]
+    spec = {**current.model_spec, "effects": ["neutral_angle"]}
+    with_effect = replace(current, parameter_set_id="ps-0123456789abcdef", model_spec=spec)
+    parameter_sets.insert(warehouse, [with_effect])
+    notes.add(warehouse, "ferry", "log", current.log_ids[0], "laden")
+    lose(warehouse, "aliases", "corrections", "notes")
+    assert [one.words for one in verify(warehouse)] == [
+        f"The table {table} is gone." for table in TABLES if table in ("aliases", "corrections", "notes")
+    ]
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == [] and len(done.done) == 3
+    said = " ".join(done.gone)
+    assert "which set is current is chosen anew by `kempf reprocess`" in said and "named aliases are lost" in said
+    assert f"her last one with effects is {with_effect.parameter_set_id} (neutral_angle)" in said
+    assert "what people said of manoeuvres has to be said again" in said and "they have to be written again" in said
+    # what was made from versions of the lost tables stands in no one's way
+    assert compaction.vacuum(warehouse, 0.0)
+
+
+def test_the_lost_model_of_a_vessel_is_named_with_what_to_do(warehouse: Warehouse) -> None:
+    (current,) = aliases.of_vessel(warehouse, "ferry").values()
+    aliases.point(warehouse, "ferry", current, "as-built")
+    for path in files(warehouse, "parameter_sets"):
+        flipped(path)
+    table_cache._kept.clear()
+    done = repair(warehouse)
+    of_ferry = [one for one in done.left if "'ferry'" in one.words]
+    assert {one.words.partition(" It was ")[2] for one in of_ferry} == {
+        "the current model of 'ferry'.",
+        "'as-built' of 'ferry'.",
+    }
+    assert all(current in one.words for one in of_ferry)
+    steps = " ".join(one.next_step or "" for one in of_ferry)
+    assert "cannot know which effects it had" in steps and "add them again with `kempf effects add`" in steps
+    assert "`kempf params alias as-built ID --vessel ferry`" in steps
+    assert all("that no name points to are made again" in words for words in done.gone)
+    output = kempf("verify", "--warehouse", warehouse.uri)
+    assert output.code == 3 and "next: kempf repair" not in output.out and "kempf effects add" in output.out
+
+
+@pytest.mark.parametrize("table", ["readings", "examinations", "logs"])
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_removed_log_is_mended_too_and_can_be_restored(warehouse: Warehouse, table: str, whole: bool) -> None:
+    wanted = content(warehouse)
+    (ferry,) = logs.current(warehouse, "ferry")
+    remove(warehouse, [ferry], "not hers")
+    if whole:
+        lose(warehouse, table)
+    else:
+        for path in files(warehouse, table):
+            flipped(path)
+    profiles = vessels.profiles(warehouse)
+    assert verify(warehouse) != []
+    assert repair(warehouse).left == [] and verify(warehouse) == []
+    assert [row.removed for row in logs.removed(warehouse)] == ["not hers"]
+    assert logs.current(warehouse, "ferry") == [] and vessels.profiles(warehouse) == profiles
+    restore(warehouse, ferry.log_id)
+    reprocess_vessel(warehouse, "ferry")
+    found = content(warehouse)
+    for name in ("readings", "rejected", "segments", "examinations", "raw"):
+        assert found[name] == wanted[name]
+    assert verify(warehouse) == []
+
+
+@pytest.mark.parametrize("also", [(), ("logs",)])
+def test_a_purged_log_is_not_taken_in_again_where_the_receipts_are_lost(
+    warehouse: Warehouse, ferry: Ship, also: tuple[str, ...], tmp_path: Path
+) -> None:
+    (row,) = logs.current(warehouse, "ferry")
+    receipt = purge(warehouse, row.log_id, "the law")
+    lose(warehouse, "purges", *also)
+    assert repair(warehouse).left == [] and verify(warehouse) == []
+    assert purges.of_logs(warehouse) == {row.log_id: receipt}
+    path = ferry.write(tmp_path / "again")
+    (outcome,) = ingest(warehouse, [path / "ferry.csv.gz"], "ferry")
+    assert outcome.error is not None and outcome.error.code == "log_purged"
 
 
 def test_sets_and_aliases_come_with_the_next_run_and_what_people_said_is_named_as_lost(warehouse: Warehouse) -> None:

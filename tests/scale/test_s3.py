@@ -18,6 +18,7 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.purge_logs import purge
 from kempf.flows.jobs.release_log import release
+from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.take_inbox import take_inbox
@@ -132,6 +133,20 @@ def test_a_damaged_object_is_reported_and_repaired(stored: Warehouse, ferry: Shi
     assert raw_bytes(stored, row.log_id) == ferry.csv
 
 
+def test_a_table_that_is_lost_whole_is_named_and_repaired(bucket: Bucket, ferry: Ship, tmp_path: Path) -> None:
+    warehouse = taken_in(Warehouse(f"{bucket.uri}/lost", bucket.settings), ferry, tmp_path)
+    found = segments.current(warehouse)
+    for name in ("vessels", "segments"):
+        for path in warehouse.paths_below(name):
+            warehouse.delete(name, *path.split("/"))
+    assert [one.words for one in verify(warehouse)] == ["The table vessels is gone.", "The table segments is gone."]
+    with pytest.raises(KempfError, match="The table segments is gone"):
+        segments.current(warehouse)
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == []
+    assert segments.current(warehouse) == found != []
+
+
 def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket) -> None:
     off = {**bucket.settings, "AWS_ENDPOINT_URL": "http://127.0.0.1:1"}
     for address, options in (("s3://fleet/stored", off), ("s3://no-such-bucket/x", bucket.settings)):
@@ -204,7 +219,8 @@ def test_a_log_is_purged_from_a_bucket(bucket: Bucket, ferry: Ship, tmp_path: Pa
     assert any(row.log_id in path for path in place.paths_below("raw"))
     receipt = purge(place, row.log_id, "end of the charter")
     assert receipt.readings > 1000 and purges.of_logs(place) == {row.log_id: receipt}
-    assert raw.kept(place) == [] and not any(row.log_id in path for path in place.paths_below("raw"))
+    assert raw.kept(place) == []
+    assert [path.rpartition("/")[2] for path in place.paths_below("raw")] == [f"{row.log_id}{purges.NOTE}"]
     for table in ("readings", "rejected", "lost", "examinations"):
         assert delta.read(place, table).height == 0
         for path in place.paths_below(table):

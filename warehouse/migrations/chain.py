@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
+from kempf.warehouse import delta, written
 from kempf.warehouse.marker import LAYOUT, Marker
 from kempf.warehouse.migrations import by_name, commits, to_3, to_4
 from kempf.warehouse.store import Warehouse
@@ -90,8 +91,16 @@ def migrate(warehouse: Warehouse, look: commits.Look) -> list[str]:
             # first, so that versions that would write as before, or had begun this, find a newer layout from here on
             passing.mark(Marker(LAYOUT, migrating=begun))
         sentences += STEPS[begun].carry_out(passing, look)
+        _note_tables(passing)
         passing.mark(Marker(LAYOUT) if begun + 1 == LAYOUT else Marker(LAYOUT, migrating=begun + 1))
     return sentences
+
+
+def _note_tables(warehouse: Warehouse) -> None:
+    """Keep of every table that is there that it was written, as earlier layouts did not."""
+    for name in TABLES:
+        if delta.open_table(warehouse, name) is not None:
+            written.note(warehouse, name)
 
 
 def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:

@@ -47,8 +47,11 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
         for words in outcome.gone:
             click.echo(f"lost: {one_line(words)}")
         for problem in outcome.left:
-            click.echo(f"still wrong: {one_line(problem.words)}")
+            click.echo(one_line(f"still wrong: {problem.words} {problem.next_step or ''}".rstrip()))
         nothing = "nothing could be made again" if outcome.left else "nothing had to be done"
-        click.echo("next: kempf reprocess" if outcome.done or outcome.gone else nothing)
+        first = (
+            "what is said of what is still wrong, then " if any(problem.next_step for problem in outcome.left) else ""
+        )
+        click.echo(f"next: {first}kempf reprocess" if outcome.done or outcome.gone else nothing)
     if outcome.left:
         sys.exit(DataRejected.exit_code)

@@ -30,7 +30,9 @@ def command(uri: str, as_json: bool) -> None:
         print_json([problem.as_json() for problem in problems])
     else:
         for problem in problems:
-            click.echo(one_line(problem.words))
-        click.echo(f"{counted(len(problems), 'problem')}; next: kempf repair" if problems else "all is well")
+            click.echo(one_line(f"{problem.words} {problem.next_step or ''}".rstrip()))
+        repairable = any(problem.next_step is None for problem in problems)
+        total = counted(len(problems), "problem") + ("; next: kempf repair" if repairable else "")
+        click.echo(total if problems else "all is well")
     if problems:
         sys.exit(DataRejected.exit_code)

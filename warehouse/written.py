@@ -1,0 +1,45 @@
+"""Which tables were ever written, kept outside their folders: one that is lost whole is none that never was.
+
+Beside the marker, in the folder ``written``, is a small file for each table. It is written once the table is there and
+before its first row, and stays: where it is there and the table is not, the table is lost.
+"""
+
+from __future__ import annotations
+
+import json
+
+from kempf.warehouse.store import Warehouse
+
+#: below the warehouse
+FOLDER = "written"
+
+
+def note(warehouse: Warehouse, name: str) -> None:
+    """Keep that a table is there; where that is kept already nothing is written."""
+    if not is_noted(warehouse, name):
+        _write(warehouse, name, made_anew=False)
+
+
+def note_anew(warehouse: Warehouse, name: str) -> None:
+    """Keep that a table that was lost is made anew: its versions begin from 0 once more."""
+    _write(warehouse, name, made_anew=True)
+
+
+def is_noted(warehouse: Warehouse, name: str) -> bool:
+    """Return whether it is kept that a table was written."""
+    return warehouse.size_of(FOLDER, name) is not None
+
+
+def was_made_anew(warehouse: Warehouse, name: str) -> bool:
+    """Return whether a table is one that was lost and made anew, so that earlier versions of it are others."""
+    data = warehouse.read_bytes(FOLDER, name)
+    try:
+        content = None if data is None else json.loads(data)
+    except ValueError:
+        return False
+    return isinstance(content, dict) and content.get("made_anew") is True
+
+
+def _write(warehouse: Warehouse, name: str, *, made_anew: bool) -> None:
+    content = {"table": name, "made_anew": made_anew}
+    warehouse.write_bytes(json.dumps(content).encode() + b"\n", FOLDER, name)
