@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cache, partial
 from math import isfinite
+from shlex import quote
 from typing import TYPE_CHECKING, Any
 
 from kempf.schemas.confidence import NORMAL_95
+from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.instants import iso_utc
 from kempf.warehouse import delta, examinations, notes, vessels
@@ -135,7 +137,11 @@ def of_vessel(
         vessels.require(warehouse, vessel)
         note = f"No parameter set of {vessel!r} " + ("is stored." if as_of is None else f"by {as_of.isoformat()}.")
         if held:
-            note = f"All {held} parameter sets of {vessel!r} are superseded; `kempf history --all` shows them."
+            then = "" if as_of is None else f" as of {as_of.isoformat()}"
+            command = f"kempf history --vessel {quote(vessel)} --all"
+            note = (
+                f"{counted(held, 'parameter set')} of {vessel!r} superseded{then}, none that stands; see `{command}`."
+            )
     elif parameter is not None:
         frame = _only(frame, parameter)
     return History(frame, version, note)

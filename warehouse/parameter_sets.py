@@ -254,6 +254,18 @@ def as_stored(warehouse: Warehouse, name: str, vessel: str | None = None) -> Par
     return as_stored(warehouse, names[0], vessel)
 
 
+def stored_anywhere(warehouse: Warehouse, name: str, vessel: str) -> ParameterSet:
+    """Return a set by its whole id as it is stored: of a vessel or, where she was renamed since, of her earlier name.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``: it is lost.
+    """
+    stored = all_as_stored(warehouse, vessel, [name])
+    return stored[0] if stored else as_stored(warehouse, name)
+
+
 def all_as_stored(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
     """Return the parameter sets of a vessel as they are stored, all or some by their whole ids, in one reading.
 

@@ -28,7 +28,9 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     pointed = aliases.of_vessel(warehouse, vessel)
     alias = aliases.CURRENT if name is None else name
     if alias in pointed:
-        return parameter_sets.get(warehouse, pointed[alias], vessel), alias
+        # what was withdrawn may be a set of the name that she had before
+        whose = None if alias == aliases.WITHDRAWN else vessel
+        return parameter_sets.get(warehouse, pointed[alias], whose), alias
     if name is None and aliases.WITHDRAWN in pointed:
         why, commands = why_withdrawn(warehouse, vessel, pointed[aliases.WITHDRAWN])
         raise NotFound(

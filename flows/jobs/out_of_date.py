@@ -78,7 +78,9 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     current, withdrawn = pointed.get(aliases.CURRENT), pointed.get(aliases.WITHDRAWN)
     commands = [command_for([vessel])]
     if current is None and withdrawn is not None:
-        why, commands = why_withdrawn(warehouse, vessel, withdrawn)
+        why, helping = why_withdrawn(warehouse, vessel, withdrawn)
+        # with logs or sets that are out of date it may be these
+        commands = [*dict.fromkeys([*commands * bool(parts), *helping])]
         said.append(f"no parameter set is current, since {why}")
     # of other code every set is superseded, which is said already
     elif current is not None and not old and current not in history.standing(warehouse, vessel):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from kempf.flows.jobs.standing_model import stored_anywhere
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
@@ -64,7 +63,7 @@ class Waiting:
     def _standing(self, name: str) -> ParameterSet:
         """Return a set that waits or is stored, as it is stored."""
         new_set = next((parameter_set for parameter_set in self.sets if parameter_set.parameter_set_id == name), None)
-        return new_set or stored_anywhere(self._warehouse, name, self._vessel)
+        return new_set or parameter_sets.stored_anywhere(self._warehouse, name, self._vessel)
 
     def point(self, parameter_set_id: str, alias: str = aliases.CURRENT) -> None:
         """Let an alias point to one of her sets, once that is stored."""

@@ -7,7 +7,7 @@ would do is done, not guessed. The warehouse that is asked about is only read.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -19,7 +19,7 @@ from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
-from kempf.schemas.errors import KempfError
+from kempf.schemas.errors import KempfError, NotFound
 from kempf.warehouse import (
     aliases,
     code_version,
@@ -199,8 +199,13 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
         corrections.add(scratch, entry.log_id, entry.segment_id, entry.correction)
     # those that no longer stand, too: their models are brought up to date with the others
     parameter_sets.insert(scratch, parameter_sets.all_as_stored(warehouse, vessel))
-    for alias, name in aliases.of_vessel(warehouse, vessel).items():
-        aliases.point(scratch, vessel, name, alias)
+    pointed = aliases.of_vessel(warehouse, vessel)
+    if aliases.WITHDRAWN in pointed:
+        # of a vessel that was renamed it is a set of the earlier name
+        with suppress(NotFound):
+            set_before = parameter_sets.stored_anywhere(warehouse, pointed[aliases.WITHDRAWN], vessel)
+            parameter_sets.insert(scratch, [set_before])
+    aliases.point_all(scratch, {(vessel, alias): name for alias, name in pointed.items()})
     return failures
 
 

@@ -15,7 +15,6 @@ from kempf.flows.jobs.former_vessel import former_vessels, reason_of_rename
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
-from kempf.flows.jobs.standing_model import standing_or_withdrawn
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError, NotFound, UsageError
@@ -251,13 +250,9 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
 
 def _hand_on_model(warehouse: Warehouse, vessel: str, name: str) -> None:
     """Let a vessel under her new name have the model that she had, as one that was withdrawn and is to be fitted."""
-    try:
-        model = standing_or_withdrawn(warehouse, vessel)
-    except NotFound:
-        # the set is lost, and with it which model it was
-        return
+    model = aliases.of_model(aliases.of_vessel(warehouse, vessel))
     if model is not None and aliases.CURRENT not in aliases.of_vessel(warehouse, name):
-        aliases.point_all(warehouse, {(name, aliases.WITHDRAWN): model.parameter_set_id})
+        aliases.point_all(warehouse, {(name, aliases.WITHDRAWN): model})
 
 
 def _require_raw(warehouse: Warehouse, vessel: str, rows: Sequence[LogRow]) -> None:

@@ -10,6 +10,7 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from shlex import quote
 
 from kempf.flows.jobs.chosen_manoeuvres import choose, out_of_date
 from kempf.flows.jobs.default_model import default_model_of
@@ -291,7 +292,19 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
             continue
         request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
         requests.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [requests[key] for key in sorted(requests)] if models else [Request(default_model_of(warehouse, vessel))]
+    return [requests[key] for key in sorted(requests)] if models else [Request(_first_model(warehouse, vessel))]
+
+
+def _first_model(warehouse: Warehouse, vessel: str) -> ModelSpec:
+    """Return the model of a vessel without sets: that which she had under an earlier name, but for its effects."""
+    name = aliases.of_model(aliases.of_vessel(warehouse, vessel))
+    try:
+        stored = parameter_sets.stored_anywhere(warehouse, name, vessel) if name else None
+    except NotFound:
+        stored = None
+    if stored is None:
+        return default_model_of(warehouse, vessel)
+    return ModelSpec.model_validate({**stored.model_spec, "effects": ()})
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
@@ -310,8 +323,8 @@ def _model_lost(warehouse: Warehouse, vessel: str) -> KempfError:
         "model_lost",
         f"The current parameter set of {vessel!r}, {name}, is not in the warehouse any more, and which effects its "
         "model had is not known without it.",
-        f"Choose another set with `kempf params alias current ID --vessel {vessel!r}`, or make the plain model current "
-        f"with `kempf identify --vessel {vessel!r}` and add its effects with `kempf effects add`.",
+        f"Choose another set with `kempf params alias current ID --vessel {quote(vessel)}`, or make the plain model "
+        f"current with `kempf identify --vessel {quote(vessel)}` and add its effects with `kempf effects add`.",
         {"vessel": vessel, "parameter_set_id": name},
     )
 

@@ -170,7 +170,8 @@ def require_current(warehouse: Warehouse, vessel: str, shown: str | None) -> str
 
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model, None where her current set is of no model of this kind."""
-    return _model_at(warehouse, vessel, current_id(warehouse, vessel))
+    name = current_id(warehouse, vessel)
+    return _if_model(parameter_sets.get(warehouse, name, vessel)) if name else None
 
 
 def current_effects(warehouse: Warehouse, only: str | None = None) -> dict[str, tuple[str, ...]]:
@@ -182,27 +183,21 @@ def current_effects(warehouse: Warehouse, only: str | None = None) -> dict[str, 
 
 
 def standing_or_withdrawn(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
-    """Return a vessel's current model or, where it was withdrawn and none came after it, that one; else None."""
-    return _model_at(warehouse, vessel, aliases.of_model(aliases.of_vessel(warehouse, vessel)))
+    """Return a vessel's current model or, where it was withdrawn and none came after it, that one; else None.
 
-
-def stored_anywhere(warehouse: Warehouse, name: str, vessel: str) -> ParameterSet:
-    """Return a set by its whole id as it is stored: of a vessel or, where she was renamed since, of her earlier name.
+    It is as it is stored: which model it is stands there, also where a set that it brings forward is lost.
 
     Raises
     ------
     NotFound
         ``no_parameter_set``: it is lost.
     """
-    stored = parameter_sets.all_as_stored(warehouse, vessel, [name])
-    return stored[0] if stored else parameter_sets.as_stored(warehouse, name)
+    name = aliases.of_model(aliases.of_vessel(warehouse, vessel))
+    return _if_model(parameter_sets.stored_anywhere(warehouse, name, vessel)) if name else None
 
 
-def _model_at(warehouse: Warehouse, vessel: str, name: str | None) -> ParameterSet | None:
-    stored = stored_anywhere(warehouse, name, vessel) if name else None
-    if stored is not None and stored.updates is not None:
-        stored = parameter_sets.get(warehouse, stored.parameter_set_id, stored.vessel)
-    return stored if stored is not None and stored.estimator in (POOLED, WITH_EFFECTS) else None
+def _if_model(stored: ParameterSet) -> ParameterSet | None:
+    return stored if stored.estimator in (POOLED, WITH_EFFECTS) else None
 
 
 def model_of(stored: ParameterSet) -> tuple[ModelSpec, Own]:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import shlex
 
-from kempf.warehouse import segments
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 
 
@@ -17,8 +18,15 @@ def why_withdrawn(warehouse: Warehouse, vessel: str, withdrawn: str) -> tuple[st
         Id of the set that was current.
     """
     name = shlex.quote(vessel)
+    reprocess = [f"kempf reprocess --vessel {name}"]
+    try:
+        former = parameter_sets.stored_anywhere(warehouse, withdrawn, vessel).vessel
+    except NotFound:
+        return f"{withdrawn} is not in the warehouse any more", reprocess
+    if former != vessel:
+        return f"her model, {withdrawn}, is still one of her earlier name, {former!r}", reprocess
     if any(segment.is_fitted for segment in segments.found_in(warehouse, vessel)):
-        return f"what {withdrawn} rests on was corrected or removed", [f"kempf reprocess --vessel {name}"]
+        return f"what {withdrawn} rests on was corrected or removed", reprocess
     return (
         "in her logs, as they are read now, no manoeuvre is found that a model is fitted to",
         [f"kempf segments --vessel {name}", "kempf doctor LOG", f"kempf vessels set {name} --profile FILE"],

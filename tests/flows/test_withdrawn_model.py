@@ -24,7 +24,7 @@ from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, history, logs, parameter_sets, segments, vessels
 from kempf.warehouse.logs import LogRow
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 from tests.warehouse import samples
 
@@ -75,6 +75,20 @@ def test_a_renamed_vessel_has_the_model_that_she_had(warehouse: Warehouse) -> No
 def test_a_rename_hands_the_model_on(warehouse: Warehouse) -> None:
     rename_vessel(warehouse, "aurora", "boreas", "sold")
     assert standing_model(warehouse, "boreas")[0] == LAGGING
+    assert "aurora" not in vessels.profiles(warehouse)
+    assert chosen_set(warehouse, "boreas", aliases.WITHDRAWN)[0].vessel == "aurora"
+    with pytest.raises(NotFound, match="earlier name, 'aurora'") as none:
+        chosen_set(warehouse, "boreas")
+    assert "kempf reprocess --vessel boreas" in none.value.next_step
+
+
+def test_a_rename_ends_also_where_what_the_model_brings_forward_is_lost(warehouse: Warehouse) -> None:
+    before = {"set": "ps-" + "0" * 16, "manoeuvres": 16, "fitted_at_once": 16}
+    made_of = samples.inputs(estimator=POOLED, settings={"segments": [], "updates": before})
+    parameter_sets.insert(warehouse, [samples.parameter_set("aurora", made_of)])
+    aliases.point_all(warehouse, {("aurora", aliases.CURRENT): parameter_set_id(made_of)})
+    rename_vessel(warehouse, "aurora", "boreas", "sold")
+    assert aliases.of_vessel(warehouse, "boreas") == {aliases.WITHDRAWN: parameter_set_id(made_of)}
     assert "aurora" not in vessels.profiles(warehouse)
 
 

@@ -111,10 +111,12 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
 
 def _stays(warehouse: Warehouse, name: str) -> str:
     """Return what of a vessel's sets does not go along, a phrase."""
-    from kempf.warehouse import aliases
+    from kempf.warehouse import aliases, notes
 
-    named = sorted(aliases.of_vessel(warehouse, name).keys() - {aliases.CURRENT, aliases.WITHDRAWN})
-    return f"; {', '.join(named)} and notes on sets stay with the sets of the old name" if named else ""
+    stays = sorted(aliases.of_vessel(warehouse, name).keys() - {aliases.CURRENT, aliases.WITHDRAWN})
+    noted = sum(note.subject == "set" for note in notes.of_vessel(warehouse, name))
+    stays += [counted(noted, "note")] * bool(noted)
+    return f"; {', '.join(stays)} stay with the sets of the old name" if stays else ""
 
 
 @command.command("rename")

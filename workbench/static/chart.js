@@ -28,7 +28,7 @@
     return head.series;
   }
 
-  const COMPASS = /heading|course/, TURNS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600];
+  const COMPASS = /heading|course/, TURNS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600, 36_000, 360_000];
   const named = one => one.panel.replaceAll("_", " ") + (one.kind === "measured" ? "" : `, ${one.kind}`);
 
   // measured is dots where something is predicted beside it, as in every figure
@@ -150,7 +150,8 @@
     // a line goes on through north; a person reads a heading of 500 deg as 140
     reading(name) {
       const compass = COMPASS.test(name) && this.unit(name)[1] === "deg";
-      return v => short(compass && v !== null && v !== undefined ? v - 360 * Math.floor(v / 360) : v);
+      const turned = v => { const shown = Number(v.toPrecision(5)); return short(shown - 360 * Math.floor(shown / 360)); };
+      return v => compass && v !== null && v !== undefined ? turned(v) : short(v);
     }
 
     sign(name) {
@@ -379,7 +380,7 @@
         row.append(name);
         const apart = first === null || second === null ? null : second - first;
         const reading = this.reading(one.panel);
-        const cells = [unit, ...(now === null ? [] : [reading(here)]), ...(a === null ? [] : [reading(first)]), ...(b === null ? [] : [reading(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? short(sum(1)) : "zoom in", whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)];
+        const cells = [unit, ...(now === null ? [] : [reading(here)]), ...(a === null ? [] : [reading(first)]), ...(b === null ? [] : [reading(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? reading(sum(1)) : "zoom in", COMPASS.test(one.panel) ? "-" : whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? reading(Math.min(...inside)) : "-", inside.length ? reading(Math.max(...inside)) : "-", String(one.total)];
         for (const words of cells) row.insertCell().textContent = words;
       }
       this.readout.replaceChildren(table);
