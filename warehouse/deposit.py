@@ -50,11 +50,23 @@ class Deposit:
 
 
 def held(
-    warehouse: Warehouse, vessel: str, file_name: str, log: LogFile, *, profile_sha256: str, code_version: str
+    warehouse: Warehouse,
+    vessel: str,
+    file_name: str,
+    log: LogFile,
+    row: logs.LogRow | None,
+    *,
+    profile_sha256: str,
+    code_version: str,
 ) -> Deposit | None:
     """Return the deposit of a log that is there already as read with this profile and code; ask before reading it.
 
     A raw copy that was damaged in the warehouse is replaced on the way.
+
+    Parameters
+    ----------
+    row : LogRow or None
+        The last row of the log, as `logs.find` returns it; None where there is none.
 
     Raises
     ------
@@ -62,7 +74,6 @@ def held(
         ``log_of_another_vessel``, ``log_purged``.
     """
     name = log.sha256
-    row = logs.find(warehouse, [name]).get(name)
     logs.refuse_other_vessel(row, vessel, file_name)
     if row is not None:
         purges.refuse(warehouse, [name])

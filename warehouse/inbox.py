@@ -1,4 +1,4 @@
-"""What became of the files of inboxes. A file has one row, its latest."""
+"""What became of the files of inboxes. A file has one row, its latest; so has an inbox that was found empty."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from kempf.warehouse.store import Warehouse
 Outcome = Literal["ingested", "quarantined", "dismissed", "gone", "removed"]
 #: what is stored of a file that is gone; earlier versions stored it as dismissed
 NO_LONGER_THERE = "It is no longer in the inbox."
+#: code of the row of an inbox itself, while no file is in it
+_EMPTY = "inbox_empty"
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class InboxFile:
 def below(warehouse: Warehouse, root: str) -> dict[str, InboxFile]:
     """Return what is known of the files below an inbox, by address; nothing where there is no warehouse.
 
+    The row of the inbox itself, if there is one, is among them.
+
     Parameters
     ----------
     root : str
@@ -54,6 +58,23 @@ def below(warehouse: Warehouse, root: str) -> dict[str, InboxFile]:
         return {}
     rows = delta.read(warehouse, "inbox").rows(named=True)
     return {row["address"]: _file(row) for row in rows if row["address"].startswith(f"{root}/")}
+
+
+def was_empty(root: str, known: Mapping[str, InboxFile]) -> bool:
+    """Return whether the last run found no file in an inbox in which files lay before.
+
+    Parameters
+    ----------
+    known : mapping of str to InboxFile
+        As `below` returns it.
+    """
+    row = known.get(f"{root}/")
+    return row is not None and row.code == _EMPTY
+
+
+def emptied(root: str, *, empty: bool) -> InboxFile:
+    """Return the row of an inbox itself: whether it is empty. It counts as no file."""
+    return InboxFile(f"{root}/", 0, 0, "gone", code=_EMPTY if empty else None)
 
 
 def _file(row: dict[str, Any]) -> InboxFile:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, Protocol
@@ -101,17 +101,23 @@ def add(
             "Give it in metres.",
             {"draught_m": draught_m},
         )
-    row = {
+    row = _as_row(vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m)
+    number = append_only.add(warehouse, "notes", row)
+    return Note(number, vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m, _written(warehouse, number))
+
+
+def _as_row(
+    vessel: str, subject: Subject, subject_id: str, text: str, event_utc_ns: int | None, draught_m: float | None
+) -> dict[str, Any]:
+    return {
         "vessel_key": vessel_key(vessel),
         "vessel": vessel,
         "subject": subject,
         "subject_id": subject_id,
         "event_utc_ns": event_utc_ns,
         "draught_m": draught_m,
-        "text": text.strip(),
+        "text": text,
     }
-    number = append_only.add(warehouse, "notes", row)
-    return Note(number, vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m, _written(warehouse, number))
 
 
 def of_vessel(warehouse: Warehouse, vessel: str | None = None, as_of: datetime | None = None) -> list[Note]:
@@ -146,34 +152,50 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None, as_of: datetime |
 
 
 def carry(
-    warehouse: Warehouse, subject: Literal["vessel", "log", "segment"], subject_id: str, vessel: str, to: str
+    warehouse: Warehouse, subjects: Collection[tuple[Subject, str]], vessel: str, to: str, every: Sequence[Note]
 ) -> None:
-    """Write the notes on a vessel, a log or a manoeuvre again for the vessel that takes her place; the old ones stay.
+    """Write the notes on a vessel, logs or manoeuvres again for the vessel that takes her place; the old ones stay.
 
     What she has already is left out, so that an interrupted move goes on and one there and back adds nothing.
 
     Parameters
     ----------
-    subject_id : str
-        The vessel's old name, or the id of the log or segment.
+    subjects : collection of tuple of Subject and str
+        Each with the vessel's old name, or the id of the log or segment.
     vessel : str
         Whose notes they are.
     to : str
         Whose they are to be.
+    every : sequence of Note
+        The notes of all vessels.
     """
-    new_id = to if subject == "vessel" else subject_id
-    by_number = {note.number: note for note in of_vessel(warehouse)}
+    by_number = {note.number: note for note in every}
+    new_id = {subject: to if subject[0] == "vessel" else subject[1] for subject in subjects}
+    new_subjects = {(kind, new_id[kind, old]) for kind, old in new_id}
     there = {
-        origin(by_number, note).number
-        for note in by_number.values()
-        if (note.vessel, note.subject, note.subject_id) == (to, subject, new_id)
+        (note.subject, note.subject_id, origin(by_number, note).number)
+        for note in every
+        if note.vessel == to and (note.subject, note.subject_id) in new_subjects
     }
-    for note in by_number.values():
+    for note in every:
+        subject = (note.subject, note.subject_id)
+        if note.vessel != vessel or subject not in new_id:
+            continue
         first = origin(by_number, note)
-        if (note.vessel, note.subject, note.subject_id) == (vessel, subject, subject_id) and first.number not in there:
-            there.add(first.number)
-            event, draught_m = note.event_utc_ns, note.draught_m
-            add(warehouse, to, subject, new_id, _carried(first), event_utc_ns=event, draught_m=draught_m)
+        place = (note.subject, new_id[subject], first.number)
+        if place not in there:
+            there.add(place)
+            row = _as_row(to, note.subject, new_id[subject], _carried(first), note.event_utc_ns, note.draught_m)
+            append_only.add(warehouse, "notes", row)
+
+
+def with_origins(warehouse: Warehouse, among: Sequence[Note]) -> dict[int, Note]:
+    """Return notes of one vessel by number, with those of all others where one of hers may have been carried to her."""
+    by_number = {note.number: note for note in among}
+    carried = ((note.number, _CARRIED.search(note.text)) for note in among)
+    if any(found and int(found[1]) < number and int(found[1]) not in by_number for number, found in carried):
+        return {note.number: note for note in of_vessel(warehouse)}
+    return by_number
 
 
 def origin(by_number: Mapping[int, Note], note: Note) -> Note:
@@ -182,7 +204,7 @@ def origin(by_number: Mapping[int, Note], note: Note) -> Note:
     Parameters
     ----------
     by_number : mapping of int to Note
-        The notes of all vessels.
+        The notes of all vessels, or what `with_origins` returns.
     """
     carried = _CARRIED.search(note.text)
     before = by_number.get(int(carried[1])) if carried else None

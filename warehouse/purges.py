@@ -47,12 +47,17 @@ def add(warehouse: Warehouse, purge: Purge) -> None:
     append_only.add(warehouse, _TABLE, {**asdict(purge), "vessel_key": vessel_key(purge.vessel)})
 
 
+def note(warehouse: Warehouse, purge: Purge) -> None:
+    """Keep a receipt where its raw log was, too, unless that is done."""
+    content = canonical_json(asdict(purge)).encode()
+    if warehouse.read_bytes(*_place(purge.log_id)) != content:
+        warehouse.write_bytes(content, *_place(purge.log_id))
+
+
 def note_all(warehouse: Warehouse) -> None:
     """Keep every receipt where its raw log was, too, as far as that is not done."""
-    for log_id, purge in of_logs(warehouse).items():
-        content = canonical_json(asdict(purge)).encode()
-        if warehouse.read_bytes(*_place(log_id)) != content:
-            warehouse.write_bytes(content, *_place(log_id))
+    for purge in of_logs(warehouse).values():
+        note(warehouse, purge)
 
 
 def noted(warehouse: Warehouse) -> dict[str, Purge]:

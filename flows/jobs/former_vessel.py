@@ -18,7 +18,7 @@ class FormerVessel:
     """A vessel that counts no longer."""
 
     vessel: str
-    #: Why, as it was given.
+    #: Why, as it was given; where she was removed after renamings, why she was removed.
     reason: str
     #: What she is called now; None where she was removed.
     now: str | None
@@ -27,9 +27,8 @@ class FormerVessel:
     def words(self) -> str:
         """What became of her, as it follows her name in a sentence; without a full stop."""
         reason = self.reason.rstrip(".")
-        return (
-            f"was removed: {reason}" if self.now is None else f"was renamed to {self.now!r}: {_RENAMED.sub('', reason)}"
-        )
+        became = "was removed" if self.now is None else f"was renamed to {self.now!r}"
+        return f"{became}: {_RENAMED.sub('', reason)}"
 
     def refused(self, message: str, next_step: str) -> NotFound:
         """Return the error of something that is for her: ``vessel_renamed`` or ``vessel_removed``."""
@@ -45,16 +44,20 @@ def reason_of_rename(name: str, reason: str) -> str:
 def former_vessels(warehouse: Warehouse) -> dict[str, FormerVessel]:
     """Return the vessels that count no longer, by name; none where there is no warehouse."""
     removed = vessels.removed(warehouse)
-    return {vessel: FormerVessel(vessel, reason, _now(removed, vessel)) for vessel, reason in removed.items()}
+    return {vessel: _former(removed, vessel) for vessel in removed}
 
 
-def _now(removed: dict[str, str], vessel: str) -> str | None:
-    """Return the name that a vessel has after all her renamings; None where in the end she was removed."""
+def _former(removed: dict[str, str], vessel: str) -> FormerVessel:
+    """Return what became of a vessel after all her renamings."""
     seen: set[str] = set()
-    while vessel in removed and vessel not in seen:
-        seen.add(vessel)
-        renamed = _RENAMED.match(removed[vessel])
+    name = last = vessel
+    while name in removed and name not in seen:
+        seen.add(name)
+        last = name
+        renamed = _RENAMED.match(removed[name])
         if renamed is None:
-            return None
-        vessel = ast.literal_eval(renamed[1])
-    return None if vessel in seen else vessel
+            break
+        name = ast.literal_eval(renamed[1])
+    if name in removed:
+        return FormerVessel(vessel, removed[last], None)
+    return FormerVessel(vessel, removed[vessel], name)

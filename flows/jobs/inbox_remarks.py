@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from kempf.schemas.enumeration import counted
+from kempf.warehouse import inbox
 from kempf.warehouse.inbox import InboxFile
 from kempf.warehouse.source_folder import Listing
 
 
-def remarks(listing: Listing, before: Collection[InboxFile]) -> Iterator[str]:
+def remarks(root: str, listing: Listing, before: Mapping[str, InboxFile]) -> Iterator[str]:
     """Yield what a person should know of an inbox as it is found, a sentence or two each.
 
     Parameters
     ----------
-    before : collection of InboxFile
-        What was known of its files before this run.
+    root : str
+        Address of the inbox.
+    before : mapping of str to InboxFile
+        What was known of its files before this run, by address.
     """
-    were = sum(row.outcome != "gone" for row in before)
-    if were and not listing.files:
+    were = sum(row.outcome != "gone" for row in before.values())
+    if were and not listing.files and not inbox.was_empty(root, before):
         yield (
             f"The inbox is empty, where {counted(were, 'file')} lay before. If nobody took them away, look whether its "
             "share is mounted and its address is right."

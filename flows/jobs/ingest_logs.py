@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from shlex import quote
@@ -211,9 +211,20 @@ def _hinted(warehouse: Warehouse, vessel: str, outcomes: list[IngestOutcome]) ->
 
 
 def ingest_log(
-    warehouse: Warehouse, vessel: str, file_name: str, log: LogFile, profile: VesselProfile, path: str
+    warehouse: Warehouse,
+    vessel: str,
+    file_name: str,
+    log: LogFile,
+    profile: VesselProfile,
+    path: str,
+    known: Mapping[str, logs.LogRow] | None = None,
 ) -> IngestOutcome:
     """Take one log in.
+
+    Parameters
+    ----------
+    known : mapping of str to LogRow, optional
+        What `logs.find` just returned of the log, where that was asked already.
 
     Raises
     ------
@@ -221,7 +232,8 @@ def ingest_log(
         The log cannot be read, or is another vessel's; nothing of it was stored.
     """
     codes = codes_of(warehouse)
-    there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=codes.ingest)
+    before = (logs.find(warehouse, [log.sha256]) if known is None else known).get(log.sha256)
+    there = held(warehouse, vessel, file_name, log, before, profile_sha256=profile.sha256, code_version=codes.ingest)
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
@@ -232,7 +244,6 @@ def ingest_log(
         stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
         examination = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel])[row.ingest_id]
         return _outcome(warehouse, path, "unchanged", row, stored_segments, examination)
-    before = logs.find(warehouse, [log.sha256]).get(log.sha256)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
         corrections_by_log = corrections.of_logs(warehouse, [log.sha256])

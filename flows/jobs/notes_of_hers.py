@@ -17,8 +17,8 @@ def notes_of_hers(warehouse: Warehouse, vessel: str) -> list[Note]:
     NotFound
         ``no_warehouse``.
     """
-    by_number = {note.number: note for note in notes.of_vessel(warehouse)}
-    every = [note for note in by_number.values() if note.vessel == vessel]
+    every = notes.of_vessel(warehouse, vessel)
+    by_number = notes.with_origins(warehouse, every)
     on_segments = {note.subject_id for note in every if note.subject == "segment"}
     log_of = {name: one.log_id for name, one in segments.by_ids(warehouse, vessel, on_segments).items()}
     log_of |= {note.subject_id: note.subject_id for note in every if note.subject == "log"}

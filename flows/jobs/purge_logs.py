@@ -89,7 +89,7 @@ def purge(warehouse: Warehouse, name: str, reason: str) -> Purge:
     if receipt.log_id not in purges.of_logs(warehouse, [receipt.log_id]):
         # first, so that a purge that was cut off is seen, and nobody takes the log in again meanwhile
         purges.add(warehouse, receipt)
-    purges.note_all(warehouse)
+    purges.note(warehouse, receipt)
     for vessel, ids in _ingests(warehouse, row).items():
         for table in _OF_INGESTS:
             erase(warehouse, table, vessel, "ingest_id", ids)

@@ -6,7 +6,7 @@ rests on it is superseded. The vessel's own sets follow with her next reprocessi
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from shlex import quote
 
@@ -22,6 +22,7 @@ from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, segm
 from kempf.warehouse.deposit import description
 from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
+from kempf.warehouse.notes import Note, Subject
 from kempf.warehouse.store import Warehouse
 
 
@@ -88,7 +89,13 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
 
 
 def move(
-    warehouse: Warehouse, name: str, vessel: str, reason: str, *, new_vessel: bool = False
+    warehouse: Warehouse,
+    name: str,
+    vessel: str,
+    reason: str,
+    *,
+    new_vessel: bool = False,
+    every_note: Sequence[Note] | None = None,
 ) -> tuple[Affected | None, LogRow]:
     """Give a log to another vessel: it is removed from the one and read from its bytes for the other.
 
@@ -104,6 +111,8 @@ def move(
         Why it was another one's.
     new_vessel : bool, optional
         Whether a vessel of this name that is not known yet is made.
+    every_note : sequence of Note, optional
+        The notes of all vessels, where they are read already.
 
     Returns
     -------
@@ -135,19 +144,22 @@ def move(
         log_corrections = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
         read = look_through(whose, row.file_name, log, profile, readings, log_corrections, codes_of(warehouse))
         # first: once the log is hers the same command has nothing to go on with
-        notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
-        for segment_id in _noted_segments(warehouse, row):
-            notes.carry(warehouse, "segment", segment_id, row.vessel, whose)
+        every = notes.of_vessel(warehouse) if every_note is None else every_note
+        notes.carry(warehouse, _noted(warehouse, row.vessel, {row.log_id}, every), row.vessel, whose, every)
         affected = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
     return affected, logs.by_prefix(warehouse, row.log_id)
 
 
-def _noted_segments(warehouse: Warehouse, row: LogRow) -> list[str]:
-    """Return the manoeuvres of a log that notes of its vessel are on; their ids stay whosever the log is."""
-    names = {note.subject_id for note in notes.of_vessel(warehouse, row.vessel) if note.subject == "segment"}
-    by_id = segments.by_ids(warehouse, row.vessel, names) if names else {}
-    return sorted(name for name, segment in by_id.items() if segment.log_id == row.log_id)
+def _noted(
+    warehouse: Warehouse, vessel: str, log_ids: Collection[str], every: Sequence[Note]
+) -> list[tuple[Subject, str]]:
+    """Return what notes of a vessel are on, of some logs and their manoeuvres; the ids stay whosever a log is."""
+    hers = {(note.subject, note.subject_id) for note in every if note.vessel == vessel}
+    names = {name for subject, name in hers if subject == "segment"}
+    by_id = segments.by_ids(warehouse, vessel, names) if names else {}
+    log_of = {("segment", name): segment.log_id for name, segment in by_id.items()}
+    return [one for one in sorted(hers) if (one[1] if one[0] == "log" else log_of.get(one)) in log_ids]
 
 
 def _on_their_way(warehouse: Warehouse, vessel: str, to: str) -> list[LogRow]:
@@ -237,12 +249,16 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
     held = [*logs.current(warehouse, vessel), *_on_their_way(warehouse, vessel, name)]
     _require_raw(warehouse, vessel, held)
     vessels.register(warehouse, name, renamed)
+    every = notes.of_vessel(warehouse)
     for row in held:
         try:
-            move(warehouse, row.log_id, name, reason)
+            move(warehouse, row.log_id, name, reason, every_note=every)
         except Exception as error:
             raise _stopped(wrapped(error), vessel, name, logs.current(warehouse, name), held) from error
-    notes.carry(warehouse, "vessel", vessel, vessel, name)
+    # read again: notes may have been written while the logs were
+    every = notes.of_vessel(warehouse)
+    on_logs = _noted(warehouse, vessel, {row.log_id for row in logs.current(warehouse, name)}, every)
+    notes.carry(warehouse, [("vessel", vessel), *on_logs], vessel, name, every)
     _hand_on_model(warehouse, vessel, name)
     vessels.remove(warehouse, vessel, reason_of_rename(name, reason))
     return logs.current(warehouse, name)

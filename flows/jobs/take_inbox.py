@@ -161,6 +161,8 @@ def take_inbox(
         *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
     )
     rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
+    if before and inbox.was_empty(folder.address, before) == bool(files):
+        rows.append(inbox.emptied(folder.address, empty=not files))
     removed: list[InboxFile] = []
     for done, arrival in enumerate(todo):
         progress(done, len(todo), f"reading {arrival.file.name}")
@@ -186,7 +188,7 @@ def take_inbox(
         tuple(waiting),
         len(due) - len(todo),
         tuple(removed),
-        tuple(remarks(listing, before.values())),
+        tuple(remarks(folder.address, listing, before)),
     )
 
 
@@ -308,10 +310,11 @@ def take(
             raise arrival.error
         with folder.opened(file) as stream:
             log = LogFile(stream)
-            gone = None if by_hand else _removed(warehouse, log)
+            known = logs.find(warehouse, [log.sha256])
+            gone = None if by_hand else _removed(warehouse, known.get(log.sha256))
             if gone is not None:
                 return _left_alone(arrival, gone), None
-            outcome = ingest_log(warehouse, arrival.vessel, file.name, log, arrival.profile, file.address)
+            outcome = ingest_log(warehouse, arrival.vessel, file.name, log, arrival.profile, file.address, known)
     except Exception as error:  # whatever it is, the next log must not pay for it
         failure = wrapped(error)
         if failure.code in _NO_FILES:
@@ -325,9 +328,8 @@ def take(
     return row, outcome
 
 
-def _removed(warehouse: Warehouse, log: LogFile) -> LogRow | None:
-    """Return what is known of a log that a person removed; None of any other, and of one that was purged."""
-    row = logs.find(warehouse, [log.sha256]).get(log.sha256)
+def _removed(warehouse: Warehouse, row: LogRow | None) -> LogRow | None:
+    """Return the last row of a log where a person removed it; None of any other, and of one that was purged."""
     return None if row is None or row.removed is None or purges.of_logs(warehouse, [row.log_id]) else row
 
 

@@ -172,13 +172,20 @@ def test_what_was_gone_for_a_night_is_tried_again_when_it_is_back(
     place.mkdir()
     gone = taken(place, warehouse)
     assert gone.quarantined == () and "The inbox is empty, where 2 files lay before" in gone.remarks[0]
-    shown = kempf("inbox", place, "--settle", 0, "--warehouse", warehouse.uri)
-    assert shown.code == 0 and "The inbox is empty" in shown.err
+    assert taken(place, warehouse).remarks == ()
     place.rmdir()
     (tmp_path / "elsewhere").rename(place)
     back = taken(place, warehouse)
     (pdf,) = back.quarantined
     assert pdf.address.endswith("minutes.pdf") and pdf.address in back.tried and back.known == 1 and not back.remarks
+    place.rename(tmp_path / "elsewhere")
+    place.mkdir()
+    for said in (True, False):
+        shown = kempf("inbox", place, "--settle", 0, "--warehouse", warehouse.uri)
+        assert shown.code == 0 and ("The inbox is empty" in shown.err) == said
+    place.rmdir()
+    (tmp_path / "elsewhere").rename(place)
+    assert not taken(place, warehouse).remarks
     # a row of earlier versions, which stored as dismissed what was only gone; what a person dismissed stays so
     inbox.record(warehouse, [replace(pdf, outcome="dismissed", message="It is no longer in the inbox.")])
     assert len(taken(place, warehouse).quarantined) == 1

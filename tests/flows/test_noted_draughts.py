@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from shutil import copytree
 
@@ -176,6 +177,26 @@ def test_notes_go_with_a_moved_log_and_a_renamed_vessel(ferry: Warehouse) -> Non
     (kept,) = (one for one in notes.of_vessel(ferry, "ro-ro") if one.subject == "vessel")
     assert (kept.subject_id, kept.event_utc_ns) == ("ro-ro", 1_000)
     assert kept.text == f"docked [ferry, note {docked.number}]"
+
+
+def test_the_notes_of_all_vessels_are_read_only_where_one_was_carried(
+    ferry: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str | None] = []
+    of_vessel = notes.of_vessel
+
+    def counted(warehouse: Warehouse, vessel: str | None = None, as_of: datetime | None = None) -> list[notes.Note]:
+        read.append(vessel)
+        return of_vessel(warehouse, vessel, as_of)
+
+    monkeypatch.setattr(notes, "of_vessel", counted)
+    for row in logs.current(ferry):
+        notes.add(ferry, "ferry", "log", row.log_id, "read at the marks [at the stern, note 1]")
+    held = len(notes_of_hers(ferry, "ferry"))
+    assert held > 1 and read == ["ferry"]
+    rename_vessel(ferry, "ferry", "ro-ro", "sold")
+    assert read.count(None) == 2 < 1 + len(logs.current(ferry))
+    assert len(notes_of_hers(ferry, "ro-ro")) == held and read[-2:] == ["ro-ro", None]
 
 
 def test_a_note_that_comes_back_is_the_original_again(ferry: Warehouse) -> None:

@@ -10,6 +10,7 @@ from kempf.flows.fleet.plan import plan
 from kempf.flows.jobs import remove_logs
 from kempf.flows.jobs.affected_sets import of_logs
 from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.former_vessel import former_vessels
 from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
@@ -215,6 +216,17 @@ def test_a_vessel_is_renamed_and_removed(warehouse: Warehouse) -> None:
     assert len(ingest(warehouse, [], "sailor")) == 0
     vessels.register(warehouse, "sailor", rows and vessels.get(warehouse, rows[0].profile_sha256))
     assert vessels.names(warehouse) == ["sailor"]
+
+
+def test_of_a_name_that_came_back_and_was_removed_the_last_reason_is_said(warehouse: Warehouse) -> None:
+    rename_vessel(warehouse, "mariner", "sailor", "sold")
+    rename_vessel(warehouse, "sailor", "mariner", "bought back")
+    assert former_vessels(warehouse)["sailor"].words == "was renamed to 'mariner': bought back"
+    remove_vessel(warehouse, "mariner", "scrapped.")
+    assert {name: one.words for name, one in former_vessels(warehouse).items()} == {
+        "mariner": "was removed: scrapped",
+        "sailor": "was removed: scrapped",
+    }
 
 
 def test_the_commands_say_first_what_will_go(warehouse: Warehouse) -> None:

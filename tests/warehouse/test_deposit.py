@@ -56,12 +56,13 @@ def test_asking_first_saves_the_reading(warehouse: Warehouse) -> None:
     given = delivery()
     asked = ("aurora", "day1.nmea.gz", given.log)
     key = {"profile_sha256": given.profile.sha256, "code_version": CODE}
-    assert held(warehouse, *asked, **key) is None  # not even a warehouse
+    assert held(warehouse, *asked, None, **key) is None  # not even a warehouse
     (done,) = deposit(warehouse, [given])
-    found = held(warehouse, *asked, **key)
+    row = logs.find(warehouse, [done.log_id])[done.log_id]
+    found = held(warehouse, *asked, row, **key)
     assert found is not None
     assert (found.ingest_id, found.outcome) == (done.ingest_id, "unchanged")
-    assert held(warehouse, *asked, profile_sha256="other", code_version=CODE) is None
+    assert held(warehouse, *asked, row, profile_sha256="other", code_version=CODE) is None
 
 
 def test_a_changed_profile_is_a_new_ingest_and_back_again(warehouse: Warehouse) -> None:
