@@ -16,7 +16,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, purges, seals, written
+from kempf.warehouse import delta, parameter_sets, purges, seals, written
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -111,16 +111,25 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
 def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:
     """Return the versions of every table that the provenance of some parameter set names, in order.
 
+    Where a table was lost and made anew, sets that were stored before that name versions of the lost one: these are
+    left out.
+
     Raises
     ------
     NotFound
         ``no_warehouse``.
     """
-    provenances = delta.read(warehouse, "parameter_sets", columns=("provenance_json",))
+    sets = delta.read(warehouse, "parameter_sets", columns=("parameter_set_id", "provenance_json"))
+    texts = sets.select(
+        "parameter_set_id", sets["provenance_json"].str.json_path_match("$.table_versions")
+    ).drop_nulls()
+    anew = {name: at for name in TABLES if (at := written.made_anew_at_ms(warehouse, name)) is not None}
+    stored = parameter_sets.stored_at_ms(warehouse) if anew and not texts.is_empty() else {}
     versions: dict[str, set[int]] = {}
-    for text in provenances["provenance_json"].str.json_path_match("$.table_versions").drop_nulls().unique().to_list():
+    for set_id, text in texts.rows():
         for name, version in json.loads(text).items():
-            versions.setdefault(name, set()).add(int(version))
+            if stored.get(set_id, 0) >= anew.get(name, 0):
+                versions.setdefault(name, set()).add(int(version))
     return {name: tuple(sorted(versions[name])) for name in sorted(versions)}
 
 
@@ -155,10 +164,7 @@ def vacuum(
     named = pinned(warehouse)
     opened = {name: delta.open_table(warehouse, name) for name in TABLES}
     tables = {name: table for name, table in opened.items() if table is not None}
-    kept = {
-        name: _kept(table, name, named.get(name, ()), older_than_hours, anew=written.was_made_anew(warehouse, name))
-        for name, table in tables.items()
-    }
+    kept = {name: _kept(table, name, named.get(name, ()), older_than_hours) for name, table in tables.items()}
     cleared = [
         _vacuumed(warehouse, name, tables[name], kept[name], older_than_hours, dry_run=dry_run) for name in tables
     ]
@@ -199,12 +205,10 @@ def _vacuumed(
     return Cleared(name, len(there), sum(there), len(keep))
 
 
-def _kept(
-    table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours: float, *, anew: bool
-) -> tuple[int, ...]:
+def _kept(table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours: float) -> tuple[int, ...]:
     newest = table.version()
     ahead = [version for version in named if not 0 <= version <= newest]
-    if ahead and not anew:
+    if ahead:
         raise KempfError(
             "version_lost",
             f"Parameter sets were made from versions {', '.join(map(str, ahead))} of the table {name}, which has "
@@ -218,4 +222,4 @@ def _kept(
     since = (datetime.now(UTC) - timedelta(hours=older_than_hours)).timestamp() * 1000.0
     # also the one that was the newest when that time began: work that began then rests on it, and may not have said so
     first = max(bisect_right(times, since) - 1, 0)
-    return tuple(sorted({*range(first, newest + 1), *named} - set(ahead)))
+    return tuple(sorted({*range(first, newest + 1), *named}))

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from kempf.schemas.errors import KempfError
+from kempf.schemas.profile import VesselProfile, parse
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import aliases, delta, logs, purges, raw, seals, vessels
 from kempf.warehouse.deposit import description
@@ -47,6 +48,7 @@ class Problem:
 Look = Callable[[str], None]
 
 _ORIGINAL = "Ingest the original file again."
+_WITH_PROFILE = "Ingest the original files again with the profile."
 
 
 def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem]:
@@ -154,16 +156,14 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
         except Exception:  # noqa: BLE001 - it is reported as damaged already
             return None
 
-    rows = column("logs", "log_id", "ingest_id", "profile_sha256", "vessel")
+    rows = column("logs", "log_id", "ingest_id")
     kept = set(raw.kept(warehouse))
     log_ids = {row[0] for row in rows or ()}
     noted = purges.noted(warehouse)
     purged = _values_of(warehouse, "purges", "log_id") | noted.keys()
     for log_id in sorted(log_ids - kept - purged):
         yield Problem("reference", "logs", log_id, f"The log {log_id} is not kept as delivered.", next_step=_ORIGINAL)
-    profiles = column("vessels", "profile_sha256")
-    for hash_ in sorted({row[2] for row in rows or ()} - {row[0] for row in profiles}) if profiles is not None else ():
-        yield Problem("reference", "vessels", hash_, f"The profile {hash_} that logs were read with is lost.")
+    yield from _of_profiles(warehouse)
     yield from _receipts(warehouse, noted)
     yield from _half_purged(warehouse, purged & kept, {row[1]: row[0] for row in rows or () if row[0] in purged})
     yield from _of_ingests(warehouse)
@@ -181,19 +181,62 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
     yield from _descriptions(warehouse)
 
 
+def ingests_with_profile(warehouse: Warehouse) -> list[LogRow]:
+    """Return the ingests of which the profile must be known: those that count, and removed ones that can be restored.
+
+    Beside a raw log only the profile of its last ingest is kept. Removed ones come first.
+    """
+    purged = purges.of_logs(warehouse)
+    return [row for row in (*logs.removed(warehouse), *logs.current(warehouse)) if row.log_id not in purged]
+
+
+def kept_profile(warehouse: Warehouse, log_id: str) -> VesselProfile | None:
+    """Return the profile that is kept beside a raw log; None where it is not, or damaged."""
+    facts = raw.described(warehouse, log_id)
+    try:
+        return None if facts is None else parse(facts["profile"], f"raw/{log_id}.json")
+    except KempfError:
+        return None
+
+
+def _of_profiles(warehouse: Warehouse) -> Iterator[Problem]:
+    """Yield the profiles that logs were read with and that are lost."""
+    try:
+        known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
+        lost = [row for row in ingests_with_profile(warehouse) if row.profile_sha256 not in known]
+        now = vessels.profiles(warehouse)
+    except Exception:  # noqa: BLE001 - it is reported as damaged already
+        return
+    for hash_ in sorted({row.profile_sha256 for row in lost}):
+        rows = [row for row in lost if row.profile_sha256 == hash_]
+        beside = [kept_profile(warehouse, row.log_id) for row in rows]
+        what = None
+        if not any(profile is not None and profile.sha256 == hash_ for profile in beside):
+            readable = all(row.vessel in now and row.removed is None for row in rows)
+            what = "`kempf reprocess` reads them with the present profile." if readable else _WITH_PROFILE
+        words = f"The profile {hash_} that logs were read with is lost."
+        yield Problem("reference", "vessels", hash_, words, next_step=what)
+
+
 def ingests_to_hold(warehouse: Warehouse) -> tuple[list[LogRow], list[LogRow]]:
     """Return the ingests of which the tables must hold what the bytes of the logs gave, and those they need not.
 
     They must of what counts now, whatever code read it, and of all that the present code reads from the bytes again: a
-    log that was removed may be restored. What earlier code read of other logs nobody can make again, and nobody needs.
-    Those of purged logs are in neither.
+    log that was removed may be restored. What earlier code read of other logs, or a profile that is lost gave of logs
+    that were read again since, nobody can make again, and nobody needs. Those of purged logs are in neither.
     """
     code = code_of(warehouse, "ingest")
     purged = purges.of_logs(warehouse)
     ingests = {row.ingest_id: row for row in logs.all_ingests(warehouse) if row.log_id not in purged}
     counting = {row.ingest_id for row in logs.current(warehouse)}
-    must = [row for name, row in ingests.items() if name in counting or row.code_version == code]
-    return must, [row for name, row in ingests.items() if name not in counting and row.code_version != code]
+    known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
+    last = {row.ingest_id for row in ingests_with_profile(warehouse)}
+
+    def can_be_read(row: LogRow) -> bool:
+        return row.code_version == code and (row.ingest_id in last or row.profile_sha256 in known)
+
+    must = {name: row for name, row in ingests.items() if name in counting or can_be_read(row)}
+    return list(must.values()), [row for name, row in ingests.items() if name not in must]
 
 
 def _of_ingests(warehouse: Warehouse) -> Iterator[Problem]:
@@ -226,8 +269,9 @@ def _half_purged(warehouse: Warehouse, kept: set[str], ingests: dict[str, str]) 
     """Yield the logs that were to be deleted for good and of which something is still there."""
     there = {ingests[ingest] for ingest in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
     for log_id in sorted(kept | there):
-        words = f"Of the purged log {log_id} something is still there: `kempf purge {log_id[:12]}` goes on."
-        yield Problem("reference", "purges", log_id, words, next_step=f"`kempf purge {log_id[:12]}` deletes it.")
+        words = f"Of the purged log {log_id} something is still there."
+        what = f"`kempf purge {log_id[:12]} --reason TEXT` deletes it."
+        yield Problem("reference", "purges", log_id, words, next_step=what)
 
 
 def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:

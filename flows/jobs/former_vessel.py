@@ -10,7 +10,9 @@ from kempf.schemas.errors import NotFound
 from kempf.warehouse import vessels
 from kempf.warehouse.store import Warehouse
 
-_RENAMED = re.compile(r"""renamed to ('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"): """)
+_NAME = r"""('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"): """
+_RENAMED = re.compile(f"renamed to {_NAME}")
+_MOVED = re.compile(f"moved to {_NAME}")
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,17 @@ class FormerVessel:
 def reason_of_rename(name: str, reason: str) -> str:
     """Return the reason that is stored of a vessel which has another name now."""
     return f"renamed to {name!r}: {reason}"
+
+
+def reason_of_move(name: str, reason: str) -> str:
+    """Return the reason that is stored of a log which another vessel has now."""
+    return f"moved to {name!r}: {reason}"
+
+
+def moved_to(reason: str) -> tuple[str, str] | None:
+    """Return to which vessel a log went, and why, by the reason that is stored of it; None where it did not."""
+    moved = _MOVED.match(reason)
+    return None if moved is None else (ast.literal_eval(moved[1]), reason[moved.end() :])
 
 
 def former_vessels(warehouse: Warehouse) -> dict[str, FormerVessel]:

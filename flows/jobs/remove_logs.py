@@ -11,7 +11,7 @@ from dataclasses import replace
 from shlex import quote
 
 from kempf.flows.jobs.affected_sets import Affected, of_logs
-from kempf.flows.jobs.former_vessel import former_vessels, reason_of_rename
+from kempf.flows.jobs.former_vessel import former_vessels, reason_of_move, reason_of_rename
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
@@ -146,7 +146,7 @@ def move(
         # first: once the log is hers the same command has nothing to go on with
         every = notes.of_vessel(warehouse) if every_note is None else every_note
         notes.carry(warehouse, _noted(warehouse, row.vessel, {row.log_id}, every), row.vessel, whose, every)
-        affected = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
+        affected = remove(warehouse, [row], reason_of_move(whose, reason)) if row.removed is None else None
         store(warehouse, [read])
     return affected, logs.by_prefix(warehouse, row.log_id)
 
@@ -164,7 +164,7 @@ def _noted(
 
 def _on_their_way(warehouse: Warehouse, vessel: str, to: str) -> list[LogRow]:
     """Return the logs of a vessel whose move to another one was cut off: they are nobody's."""
-    rows = [row for row in logs.removed(warehouse, vessel) if (row.removed or "").startswith(f"moved to {to!r}: ")]
+    rows = [row for row in logs.removed(warehouse, vessel) if (row.removed or "").startswith(reason_of_move(to, ""))]
     last = logs.find(warehouse, [row.log_id for row in rows])
     return [row for row in rows if last[row.log_id].ingest_id == row.ingest_id]
 

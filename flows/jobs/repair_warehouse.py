@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from kempf.flows.jobs import search_log
+from kempf.flows.jobs.former_vessel import moved_to, reason_of_rename
 from kempf.flows.jobs.ingest_logs import ingest_log, look_through, store
 from kempf.flows.jobs.spool import spooled
 from kempf.flows.process.progress import Progress, silent
@@ -42,9 +43,17 @@ from kempf.warehouse.deposit import describe_all
 from kempf.warehouse.equivalents import code_of, codes_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
-from kempf.warehouse.migrations.chain import repair_marker
+from kempf.warehouse.migrations.chain import MARKER_MENDED, repair_marker
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, ingests_to_hold, verify
+from kempf.warehouse.verify import (
+    ASIDE,
+    UNFINISHED,
+    Problem,
+    ingests_to_hold,
+    ingests_with_profile,
+    kept_profile,
+    verify,
+)
 
 #: tables whose rows come of the bytes of a log and of nothing else
 _OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")
@@ -67,6 +76,8 @@ class Repaired:
     sets: list[str] = field(default_factory=list)
     #: Whether names of parameter sets are lost.
     names: bool = False
+    #: Whether rows of the register of vessels are lost.
+    vessels: bool = False
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
     registers: bool = False
 
@@ -85,7 +96,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     """
     outcome = Repaired()
     if repair_marker(warehouse):
-        outcome.done.append("The file that marks the warehouse was written anew.")
+        outcome.done.append(MARKER_MENDED)
     warehouse.require()
     _recall(warehouse, outcome)
     for name in TABLES:
@@ -112,9 +123,6 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     if not _unread_left(outcome):
         warehouse.delete(*UNFINISHED)
     outcome.left = verify(warehouse, lambda what: progress(0, 1, what))
-    outcome.gone += [
-        f"{problem.words} Ingest the original file again." for problem in outcome.left if problem.kind == "raw log"
-    ]
     _sets_lost(outcome)
     if outcome.names:
         _say_models(warehouse, outcome)
@@ -184,6 +192,7 @@ def _made_anew(warehouse: Warehouse, name: str, outcome: Repaired) -> None:
 def _say_lost(what: str, name: str, outcome: Repaired) -> None:
     """Say that rows of a table are lost that no log gives again."""
     outcome.names |= name == "aliases"
+    outcome.vessels |= name == "vessels"
     if name == "parameter_sets":
         outcome.sets.append(what)
     elif name not in _OF_LOGS and name != "logs":
@@ -239,7 +248,10 @@ def _recall(warehouse: Warehouse, outcome: Repaired) -> None:
 
 
 _AFTER = {
-    "vessels": ": profiles are made again from what is kept beside the raw logs",
+    "vessels": (
+        ": profiles are made again from what is kept beside the raw logs, those of earlier ingests and of vessels "
+        "without logs are not"
+    ),
     "aliases": (
         ": which set is current is chosen anew by `kempf reprocess`, which cannot know the effects of a model; named "
         "aliases are lost, give them again with `kempf params alias NAME ID`"
@@ -366,21 +378,53 @@ def _taken_in(warehouse: Warehouse, name: str) -> str:
 
 def _profiles(warehouse: Warehouse, outcome: Repaired) -> None:
     """Register the profiles again that logs were read with and that are lost, those of later logs last."""
-    known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
-    rows = [*logs.removed(warehouse), *logs.current(warehouse)]
-    lost = [row for row in rows if row.profile_sha256 not in known]
-    now = vessels.profiles(warehouse)
-    for row in lost:
-        facts = raw.described(warehouse, row.log_id)
-        if facts is not None:
-            vessels.register(warehouse, row.vessel, parse(facts["profile"], f"raw/{row.log_id}.json"))
-    for vessel in sorted({row.vessel for row in lost} & now.keys()):
+    known = vessels.all_versions(warehouse)
+    hashes, before = {version.profile_sha256 for version in known}, {version.vessel for version in known}
+    now, removed = vessels.profiles(warehouse), vessels.removed(warehouse)
+    again: set[str] = set()
+    for row in ingests_with_profile(warehouse):
+        profile = kept_profile(warehouse, row.log_id) if row.profile_sha256 not in hashes else None
+        if profile is not None and vessels.register(warehouse, row.vessel, profile):
+            again.add(row.vessel)
+    counting = {row.vessel for row in logs.current(warehouse)}
+    for vessel in sorted(again & now.keys()):
         vessels.register(warehouse, vessel, now[vessel])  # what was current and not lost stays current
-    removed = {row.vessel for row in lost} - {row.vessel for row in logs.current(warehouse)} - now.keys()
-    for vessel in sorted(removed):
-        vessels.remove(warehouse, vessel, "her logs were removed")
-    if lost:
-        outcome.done.append(f"Profiles were registered again: {', '.join(sorted({row.vessel for row in lost}))}.")
+    for vessel in sorted((again & removed.keys()) - counting):
+        vessels.remove(warehouse, vessel, removed[vessel])
+    of_logs = {row.vessel for row in logs.all_ingests(warehouse)}
+    for vessel in sorted(of_logs - before - counting):
+        again |= _without_logs(warehouse, vessel, outcome)
+    if again:
+        outcome.done.append(f"Profiles were registered again: {', '.join(sorted(again))}.")
+
+
+def _without_logs(warehouse: Warehouse, vessel: str, outcome: Repaired) -> set[str]:
+    """Let a vessel who is lost from the register, and of whose logs none counts, be what her logs tell that she was.
+
+    Where all of them went to one vessel she was renamed. Else nobody knows whether she was removed with her logs.
+    Return her where she was registered.
+    """
+    rows = logs.removed(warehouse, vessel)
+    last = logs.find(warehouse, [row.log_id for row in rows])
+    moves = [moved_to(row.removed or "") if last[row.log_id].vessel != vessel else None for row in rows]
+    names = {None if one is None else one[0] for one in moves}
+    beside = [profile for row in rows if (profile := kept_profile(warehouse, row.log_id)) is not None]
+    if beside and len(names) == 1 and moves[-1] is not None:
+        name, reason = moves[-1]
+        vessels.register(warehouse, vessel, beside[-1].model_copy(update={"vessel": vessel}))
+        vessels.remove(warehouse, vessel, reason_of_rename(name, reason))
+        outcome.done.append(f"{vessel} has the name {name} now, as before: all her logs went there.")
+        return {vessel}
+    if vessel in vessels.names(warehouse):
+        outcome.gone.append(
+            f"whether {vessel!r} was removed or renamed, of whose logs none counts: she counts again; "
+            f"`kempf vessels remove {shlex.quote(vessel)} --reason TEXT` takes her out"
+        )
+    elif outcome.vessels:
+        words = f"the profile of {vessel!r}, of whose logs none counts, and whether she was removed or renamed"
+        if words not in outcome.gone:
+            outcome.gone.append(words)
+    return set()
 
 
 def _unread_ingests(warehouse: Warehouse, outcome: Repaired, taken_in: Collection[str]) -> list[str]:
@@ -401,8 +445,8 @@ def _unread_ingests(warehouse: Warehouse, outcome: Repaired, taken_in: Collectio
 
     must, others = ingests_to_hold(warehouse)
     touched = [row for row in others if not whole(row)]
-    if touched:
-        words = "what earlier code had read of logs that were removed or read again since"
+    if touched and (outcome.months or outcome.vessel_keys):
+        words = "what earlier code, or a profile that is lost, had given of logs that were removed or read again since"
         outcome.gone.append(f"{words} ({counted(len(touched), 'ingest')}); nothing needs it")
     return [row.ingest_id for row in must if row.code_version == code and not whole(row)]
 

@@ -12,9 +12,10 @@ import pytest
 
 from kempf.flows.jobs.correct_segments import plan_for
 from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.former_vessel import former_vessels
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.purge_logs import purge
-from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, restore
+from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
 from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.schemas.errors import KempfError
@@ -278,7 +279,7 @@ def test_a_raw_log_that_is_in_no_table_and_of_which_it_is_not_known_whose_it_is_
     beside.write_bytes(beside.read_bytes()[:100])
     done = repair(place)
     assert [(one.table, one.where) for one in done.left] == [("raw", f"{row.log_id}.json")]
-    assert any("Ingest the original file again" in words for words in done.gone)
+    assert [one.next_step for one in done.left] == ["Ingest the original file again."]
     assert [one.vessel for one in logs.current(place)] == ["mariner"]
 
 
@@ -292,7 +293,9 @@ def test_a_table_that_is_gone_and_a_raw_log_that_is_damaged(warehouse: Warehouse
     assert {one.table for one in verify(warehouse)} >= {"raw", "segments"}
     done = repair(warehouse)
     assert [one.table for one in done.left] == ["raw"]
-    assert any("Ingest the original file again" in words for words in done.gone)
+    assert not any("Ingest the original file again" in words for words in done.gone)
+    output = kempf("repair", "--yes", "--warehouse", warehouse.uri)
+    assert output.code == 3 and output.out.count("Ingest the original file again.") == 1
     assert len(segments.current(warehouse)) == 2
 
 
@@ -351,6 +354,86 @@ def test_profiles_come_again_and_what_was_current_stays(warehouse: Warehouse) ->
     table_cache._kept.clear()
     assert repair(warehouse).left == []
     assert vessels.names(warehouse) == ["mariner"] and vessels.current(warehouse, "mariner").length_m == 99.0
+
+
+def read_anew(warehouse: Warehouse) -> str:
+    """Give the ferry a newer profile and read her log with it; return the hash of the earlier one."""
+    earlier = vessels.current(warehouse, "ferry")
+    vessels.register(warehouse, "ferry", earlier.model_copy(update={"length_m": 99.0}))
+    reprocess_vessel(warehouse, "ferry")
+    (row,) = logs.current(warehouse, "ferry")
+    assert row.profile_sha256 != earlier.sha256
+    return earlier.sha256
+
+
+@pytest.mark.parametrize("also", [(), ("readings",)])
+def test_profiles_of_earlier_ingests_are_not_asked_for(warehouse: Warehouse, also: tuple[str, ...]) -> None:
+    earlier = read_anew(warehouse)
+    lose(warehouse, "vessels", *also)
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == []
+    assert any("those of earlier ingests" in words for words in done.gone)
+    assert earlier not in {version.profile_sha256 for version in vessels.all_versions(warehouse)}
+    assert vessels.current(warehouse, "ferry").length_m == 99.0
+    again = repair(warehouse)
+    assert again.done == again.gone == []
+
+
+@pytest.mark.parametrize("newer", [False, True])
+def test_renames_are_told_from_the_logs(warehouse: Warehouse, newer: bool) -> None:
+    if newer:
+        read_anew(warehouse)
+    rename_vessel(warehouse, "ferry", "o'ferry", "sold: to Oslo")
+    rename_vessel(warehouse, "o'ferry", "fähre", "sold again")
+    wanted, profiles = former_vessels(warehouse), vessels.profiles(warehouse)
+    lose(warehouse, "vessels")
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == []
+    assert former_vessels(warehouse) == wanted and vessels.profiles(warehouse) == profiles
+    assert [one.now for one in wanted.values()] == ["fähre", "fähre"]
+    again = repair(warehouse)
+    assert again.done == again.gone == []
+
+
+def test_a_vessel_whose_logs_were_removed_counts_still(warehouse: Warehouse) -> None:
+    remove(warehouse, logs.current(warehouse, "ferry"), "not hers")
+    profiles = vessels.profiles(warehouse)
+    lose(warehouse, "vessels")
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == []
+    assert vessels.profiles(warehouse) == profiles and former_vessels(warehouse) == {}
+    assert any(words.startswith("whether 'ferry' was removed or renamed") for words in done.gone)
+
+
+def test_what_logs_that_went_to_two_vessels_do_not_tell_is_said(tmp_path: Path) -> None:
+    warehouse = fresh(tmp_path / "w")
+    for day in range(2):
+        take_in(warehouse, day)
+    for name, row in zip(("one", "two"), logs.current(warehouse, "ferry"), strict=True):
+        vessels.register(warehouse, name, vessels.current(warehouse, "ferry"))
+        move(warehouse, row.log_id, name, "hers")
+    lose(warehouse, "vessels")
+    done = repair(warehouse)
+    assert done.left == [] and verify(warehouse) == [] and vessels.names(warehouse) == ["one", "two"]
+    assert sum(words.startswith("the profile of 'ferry'") for words in done.gone) == 1
+
+
+@pytest.mark.parametrize("removed", [False, True])
+def test_a_profile_that_is_kept_nowhere_has_its_step(warehouse: Warehouse, removed: bool) -> None:
+    (row,) = logs.current(warehouse, "ferry")
+    if removed:
+        remove(warehouse, [row], "not hers")
+    lose(warehouse, "vessels")
+    assert warehouse.folder is not None
+    (warehouse.folder / "raw" / row.log_id[:2] / f"{row.log_id}.json").unlink()
+    (left,) = repair(warehouse).left
+    assert left.where == row.profile_sha256 and left.next_step == "Ingest the original files again with the profile."
+    if not removed:
+        vessels.register(warehouse, "ferry", vessels.current(warehouse, "mariner"))
+        (left,) = repair(warehouse).left
+        assert left.next_step == "`kempf reprocess` reads them with the present profile."
+        reprocess_vessel(warehouse, "ferry")
+        assert verify(warehouse) == []
 
 
 def test_the_marker_is_mended_by_the_command(warehouse: Warehouse) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from shutil import copytree, rmtree
 
@@ -9,11 +10,11 @@ import pytest
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import compaction, delta, logs, written
+from kempf.warehouse import compaction, delta, logs, parameter_sets, written
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
-from tests.warehouse.samples import delivery
+from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set
 
 
 @pytest.fixture
@@ -77,13 +78,21 @@ def test_a_table_that_another_writer_makes_meanwhile_is_no_lost_one(
 
 
 def test_versions_of_a_lost_table_stop_no_vacuum(filled: Warehouse) -> None:
-    table = delta.open_table(filled, "logs")
-    assert table is not None
+    def store(start_utc_ns: int) -> None:
+        asked = inputs(start_utc_ns=start_utc_ns)
+        stored = parameter_set("aurora", asked, provenance={"table_versions": {"logs": 7}})
+        parameter_sets.insert(filled, [stored])
+
+    store(START_NS)
     with pytest.raises(KempfError, match="versions 7"):
-        compaction._kept(table, "logs", (7,), 0.0, anew=False)
-    assert not written.was_made_anew(filled, "logs")
+        compaction.vacuum(filled, 0.0)
+    assert written.made_anew_at_ms(filled, "logs") is None
     lose(filled, "logs")
+    time.sleep(0.01)
     delta.make_anew(filled, "logs")
-    assert written.was_made_anew(filled, "logs")
-    table = delta.open_table(filled, "logs")
-    assert table is not None and compaction._kept(table, "logs", (7,), 0.0, anew=True) == (0,)
+    assert written.made_anew_at_ms(filled, "logs") is not None
+    assert compaction.pinned(filled) == {} and compaction.vacuum(filled, 0.0)
+    time.sleep(0.01)
+    store(START_NS + 1)  # of the table as it is now: an older copy of it is noticed
+    with pytest.raises(KempfError, match="versions 7"):
+        compaction.vacuum(filled, 0.0)

@@ -118,6 +118,10 @@ def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
         )
 
 
+#: what is said where the marker was mended
+MARKER_MENDED = "The file that marks the warehouse was written anew."
+
+
 def repair_marker(warehouse: Warehouse) -> bool:
     """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
 

@@ -25,7 +25,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     still wrong.
     """
     from kempf.flows.jobs.repair_warehouse import repair
-    from kempf.warehouse.migrations.chain import repair_marker
+    from kempf.warehouse.migrations.chain import MARKER_MENDED, repair_marker
     from kempf.warehouse.store import Warehouse
     from kempf.warehouse.verify import verify
 
@@ -38,7 +38,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     with progress_bar() as progress:
         outcome = repair(warehouse, progress)
     if repaired:
-        outcome.done.insert(0, "The file that marks the warehouse was written anew.")
+        outcome.done.insert(0, MARKER_MENDED)
     if as_json:
         print_json(outcome.as_json())
     else:
