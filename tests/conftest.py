@@ -28,8 +28,8 @@ os.environ["PYTHONDONTWRITEBYTECODE"] = ""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
-    """Two processes more than there are cores: tests with servers, workers and kills wait more than they compute."""
-    return (os.cpu_count() or 1) + 2
+    """One process more than there are cores: tests with servers, workers and kills wait more than they compute."""
+    return (os.cpu_count() or 1) + 1
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def outside(folder: Path) -> set[str]:
 def check_names(place: Path) -> None:
     """Every folder of a warehouse is named by the house alone; of a vessel's name only letters and digits are left."""
     parts = {part for name in tree(place) for part in Path(name).parts}
-    allowed = {"kempf-warehouse.json", "raw", "_delta_log", "_seals", "log", "data"}
+    allowed = {"kempf-warehouse.json", "written", "raw", "_delta_log", "_seals", "log", "data"}
     tables = {"vessels", "logs", "readings", "rejected", "segments", "examinations"} | {
         "parameter_sets",
         "aliases",

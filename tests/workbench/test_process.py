@@ -177,6 +177,6 @@ def test_interrupted_by_a_person(logs: Path, tmp_path: Path):
     assert len(kept) < 30
     assert len(kempf("segments", "--warehouse", store, "--json").json) == len(kept)
     assert all(
-        name.split("/")[0] in {"kempf-warehouse.json", *TABLES, "raw"} - {"parameter_sets", "aliases"}
+        name.split("/")[0] in {"kempf-warehouse.json", "written", *TABLES, "raw"} - {"parameter_sets", "aliases"}
         for name in tree(store)
     )
