@@ -36,7 +36,7 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
         raise NotFound(
             "no_parameter_set",
             f"No parameter set of {vessel!r} is current: {why}.",
-            f"Bring its model up to date: {', '.join(f'`{command}`' for command in commands)}.",
+            f"What helps: {', '.join(f'`{command}`' for command in commands)}.",
             {"vessel": vessel, "withdrawn": pointed[aliases.WITHDRAWN]},
         )
     if name is None:

@@ -22,7 +22,8 @@ def why_withdrawn(warehouse: Warehouse, vessel: str, withdrawn: str) -> tuple[st
     try:
         former = parameter_sets.stored_anywhere(warehouse, withdrawn, vessel).vessel
     except NotFound:
-        return f"{withdrawn} is not in the warehouse any more", reprocess
+        anew = [f"kempf params alias current ID --vessel {name}", f"kempf identify --vessel {name}"]
+        return f"{withdrawn} is not in the warehouse any more", anew
     if former != vessel:
         return f"her model, {withdrawn}, is still one of her earlier name, {former!r}", reprocess
     if any(segment.is_fitted for segment in segments.found_in(warehouse, vessel)):
