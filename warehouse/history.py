@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -120,7 +120,7 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, _Logs([], None, {}, [], code_of(warehouse, "estimate"), then=True))
+            nothing = _exploded(None, vessel, _Logs([], None, dict, [], code_of(warehouse, "estimate"), then=True))
             return History(
                 nothing,
                 None,
@@ -139,9 +139,8 @@ def of_vessel(
         if held:
             then = "" if as_of is None else f" as of {as_of.isoformat()}"
             command = f"kempf history --vessel {quote(vessel)} --all"
-            note = (
-                f"{counted(held, 'parameter set')} of {vessel!r} superseded{then}, none that stands; see `{command}`."
-            )
+            past = f"{counted(held, 'parameter set')} superseded"
+            note = f"No parameter set of {vessel!r} stands{then}: {past}; see `{command}`."
     elif parameter is not None:
         frame = _only(frame, parameter)
     return History(frame, version, note)
@@ -292,8 +291,8 @@ class _Logs:
     past: list[str]
     #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
-    #: Manoeuvres in these that another log holds better, by id, and the id of that one; not known of the past.
-    twins: Mapping[str, str]
+    #: Reads `_twins` of these; nothing of the past, of which that is not known.
+    twins: Callable[[], Mapping[str, str]]
     #: Notes on her and what is hers.
     notes: list[Note]
     #: Fingerprint under which the present code estimates.
@@ -306,7 +305,7 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return _Logs([], None, {}, [], code_of(warehouse, "estimate"), then=True)
+        return _Logs([], None, dict, [], code_of(warehouse, "estimate"), then=True)
     columns = ("log_id", "ingest_id", "revision", "removed")
     rows = _read(warehouse, "logs", vessel, {}, columns, version).sort("log_id", "revision")
     last = {row["log_id"]: row for row in rows.rows(named=True)}
@@ -314,11 +313,12 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     segments = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
     noted = notes.of_vessel(warehouse, vessel, as_of)
-    twins = _twins(warehouse, vessel) if as_of is None and segments else {}
+    twins = partial(_twins, warehouse, vessel) if as_of is None and segments else dict
     return _Logs(past, segments, twins, noted, code_of(warehouse, "estimate"), as_of is not None)
 
 
 def _twins(warehouse: Warehouse, vessel: str) -> dict[str, str]:
+    """Return which manoeuvres another log holds better, by id, and the id of that one."""
     from kempf.warehouse import segments
     from kempf.warehouse.deduplicate import twins
 
@@ -424,7 +424,7 @@ def _noted_otherwise(inputs: dict[str, Any], among: Sequence[Note]) -> bool:
     return bool(held) and notes.draughts_m(among, [Bounds(**segment) for segment in inputs["segments"]]) != held
 
 
-def _with_chains(sets: pl.DataFrame, doubles: Mapping[str, str]) -> pl.Series:
+def _with_chains(sets: pl.DataFrame, twins: Callable[[], Mapping[str, str]]) -> pl.Series:
     """Return which sets are superseded: those that rest on such ones, and pooled ones that another one contains."""
     import polars as pl
 
@@ -434,7 +434,7 @@ def _with_chains(sets: pl.DataFrame, doubles: Mapping[str, str]) -> pl.Series:
     rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
     # nearly all of a vessel's sets have the settings of another one
     parts = cache(_parts)
-    known = {row["parameter_set_id"]: _Rests(row, *parts(row["settings_json"]), doubles) for row in rows}
+    known = {row["parameter_set_id"]: _Rests(row, *parts(row["settings_json"])) for row in rows}
     for basis in sorted(known.values(), key=lambda basis: basis.update.manoeuvres if basis.update else 0):
         if basis.update is not None:
             # it rests on fewer manoeuvres, so that what that one rests on is known
@@ -443,6 +443,12 @@ def _with_chains(sets: pl.DataFrame, doubles: Mapping[str, str]) -> pl.Series:
     for basis in known.values():
         if basis.pooled and basis.converged and not basis.superseded:
             kinds.setdefault(basis.kind, []).append(basis)
+    pooled = [basis for basis in known.values() if basis.pooled and not basis.superseded]
+    if any(other is not basis for basis in pooled for other in kinds.get(basis.kind, ())):
+        # read only where sets are compared: it takes all of her manoeuvres
+        doubles = twins()
+        for basis in pooled:
+            basis.take_whole(doubles)
     for alike in kinds.values():
         # the largest first: it contains most others, so that few are compared
         alike.sort(key=lambda basis: len(basis.segments), reverse=True)
@@ -465,15 +471,11 @@ def _parts(settings_json: str) -> tuple[Update | None, str]:
 class _Rests:
     """What a set rests on, and whether anything of it is superseded."""
 
-    def __init__(
-        self, row: Mapping[str, Any], update: Update | None, settings_text: str, doubles: Mapping[str, str]
-    ) -> None:
+    def __init__(self, row: Mapping[str, Any], update: Update | None, settings_text: str) -> None:
         self.update = update
-        names = row["segment_ids"]
-        #: Each as the log holds it that has most of it.
-        self.segments = frozenset(doubles.get(name, name) for name in names)
-        #: How many it takes from a log that has less of them.
-        self.in_part = sum(name in doubles for name in names)
+        self.segments = frozenset(row["segment_ids"])
+        #: How many of them it takes from a log that has less of them than another one.
+        self.in_part = 0
         self.superseded: bool = row["superseded"]
         self.converged: bool = row["converged"]
         #: Whether it goes by draughts that were noted.
@@ -486,7 +488,11 @@ class _Rests:
         self.superseded = self.superseded or before is None or before.superseded
         if before is not None:
             self.segments |= before.segments
-            self.in_part += before.in_part
+
+    def take_whole(self, doubles: Mapping[str, str]) -> None:
+        """Name every manoeuvre as the log holds it that has most of it, see `_twins`."""
+        self.in_part = sum(name in doubles for name in self.segments)
+        self.segments = frozenset(doubles.get(name, name) for name in self.segments)
 
     @property
     def pooled(self) -> bool:

@@ -195,8 +195,10 @@ def together(first: Report, second: Report) -> Report:
     """Return the report of two attempts on one vessel: what both did, and what the second left."""
     sums = {key: first[key] + second[key] for key in ("new_sets", "reread", "searched")}
     kept = max(second["kept_sets"] - first["new_sets"], 0)
-    changed = "changed" if second["status"] == "unchanged" and any(sums.values()) else second["status"]
-    return {**second, "status": changed, "kept_sets": kept, **sums}
+    current = second["current"] or first["current"]
+    some = any(sums.values()) or current or first["withdrawn"]
+    changed = "changed" if second["status"] == "unchanged" and some else second["status"]
+    return {**second, "status": changed, "kept_sets": kept, "current": current, **sums}
 
 
 def do_fleet(

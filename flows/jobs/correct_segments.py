@@ -15,7 +15,7 @@ from kempf.flows.jobs import search_log
 from kempf.flows.jobs.affected_sets import Affected, of_segments
 from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.search_log import SearchedLog, search_again
-from kempf.pipeline.segment.corrections import same
+from kempf.pipeline.segment.corrections import same, standing
 from kempf.schemas.correction import Action, Bounds, Correction
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
@@ -60,8 +60,8 @@ class Planned:
 
     def _was_excluded(self, now: Sequence[Correction]) -> bool:
         """Return whether another person excluded the manoeuvre since this was planned."""
-        mine = [said for said in now if said.subject_utc_ns == self.correction.subject_utc_ns]
-        return bool(mine) and mine[-1].action == "exclude"
+        subject = self.correction.subject_utc_ns
+        return any(known.subject_utc_ns == subject and known.excluded is not None for known in standing(now))
 
     @property
     def doubts(self) -> tuple[str, ...]:

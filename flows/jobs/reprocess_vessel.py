@@ -234,9 +234,9 @@ class _Reprocessing:
         """Bring up to date what rests on the sets that are stored now."""
         if work.report.segments and self.request is None:
             self._model(work)
-        _withdraw(self.warehouse, work.vessel, work.report)
-        now = aliases.of_vessel(self.warehouse, work.vessel).get(aliases.CURRENT)
-        if work.before is not None and now != dict(work.before.aliases).get(aliases.CURRENT):
+        assert work.before is not None
+        now = _withdraw(self.warehouse, work.vessel, work.report)
+        if now != dict(work.before.aliases).get(aliases.CURRENT):
             work.report.current = now
         work.report.findings = [finding.as_json() for finding in quality_of(self.warehouse, work.vessel)]
 
@@ -307,14 +307,14 @@ def _first_model(warehouse: Warehouse, vessel: str) -> ModelSpec:
     return ModelSpec.model_validate({**stored.model_spec, "effects": ()})
 
 
-def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
-    """Withdraw ``current`` where its set is of a profile or code that no longer stands."""
+def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> str | None:
+    """Withdraw ``current`` where its set is of a profile or code that no longer stands; return where it points now."""
     pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    if pointed is None:
-        return
-    if pointed not in history.standing(warehouse, vessel):
-        aliases.withdraw(warehouse, vessel)
-        report.withdrawn = pointed
+    if pointed is None or pointed in history.standing(warehouse, vessel):
+        return pointed
+    aliases.withdraw(warehouse, vessel)
+    report.withdrawn = pointed
+    return None
 
 
 def _model_lost(warehouse: Warehouse, vessel: str) -> KempfError:

@@ -28,7 +28,8 @@
     return head.series;
   }
 
-  const COMPASS = /heading|course/, TURNS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600, 36_000, 360_000];
+  const isCompass = name => /heading|course/.test(name);
+  const TURNS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 15, 30, 45, 90, 180, 360, 720, 3600, 36_000, 360_000];
   const named = one => one.panel.replaceAll("_", " ") + (one.kind === "measured" ? "" : `, ${one.kind}`);
 
   // measured is dots where something is predicted beside it, as in every figure
@@ -43,7 +44,7 @@
   function turned(series) {
     for (const one of series) {
       const first = values => values.find(v => v !== null), beside = series.find(other => other.panel === one.panel && other.kind === "measured");
-      if (!COMPASS.test(one.panel) || one.kind === "measured" || !beside || first(one.y) === undefined || first(beside.y) === undefined) continue;
+      if (!isCompass(one.panel) || one.kind === "measured" || !beside || first(one.y) === undefined || first(beside.y) === undefined) continue;
       const by = 2 * Math.PI * Math.round((first(one.y) - first(beside.y)) / (2 * Math.PI));
       if (by) one.y = one.y.map(v => v === null ? null : v - by);
     }
@@ -149,10 +150,11 @@
 
     // a line goes on through north; a person reads a heading of 500 deg as 140
     reading(name) {
-      const compass = COMPASS.test(name) && this.unit(name)[1] === "deg";
       const turned = v => { const shown = Number(v.toPrecision(5)); return short(shown - 360 * Math.floor(shown / 360)); };
-      return v => compass && v !== null && v !== undefined ? turned(v) : short(v);
+      return v => this.inTurns(name) && v !== null && v !== undefined ? turned(v) : short(v);
     }
+
+    inTurns(name) { return isCompass(name) && this.unit(name)[1] === "deg"; }
 
     sign(name) {
       const sign = this.boxes.find(box => box.value === name).dataset.sign;
@@ -188,7 +190,7 @@
       const clock = (u, splits, _, __, step) => splits.map(s => iso(s).slice(11, step < 1 ? 22 : step < 60 ? 19 : 16));
       const time = last ? { ...axis, values: clock, space: 80 } : { ...axis, values: (u, splits) => splits.map(() => ""), size: 8, space: 80 };
       const drawn = found.map(one => ({ label: found.length > 1 ? `${label}, ${one.kind}` : label, value: (_, v) => reading(v), ...style(one, found.length > 1) }));
-      const level = unit === "deg" && COMPASS.test(found[0].panel) ? { values: (u, splits) => splits.map(reading), incrs: TURNS, space: 20 } : {};
+      const level = this.inTurns(found[0].panel) ? { values: (u, splits) => splits.map(reading), incrs: TURNS, space: 20 } : {};
       const plot = new uPlot({
         width: Math.max(200, this.panels.clientWidth), height: (last ? 150 : 124) + (top ? NAMES : 0), padding: [top ? NAMES : null, null, null, null], tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
         scales: { x: { time: true, range: () => this.span } },
@@ -380,7 +382,7 @@
         row.append(name);
         const apart = first === null || second === null ? null : second - first;
         const reading = this.reading(one.panel);
-        const cells = [unit, ...(now === null ? [] : [reading(here)]), ...(a === null ? [] : [reading(first)]), ...(b === null ? [] : [reading(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? reading(sum(1)) : "zoom in", COMPASS.test(one.panel) ? "-" : whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? reading(Math.min(...inside)) : "-", inside.length ? reading(Math.max(...inside)) : "-", String(one.total)];
+        const cells = [unit, ...(now === null ? [] : [reading(here)]), ...(a === null ? [] : [reading(first)]), ...(b === null ? [] : [reading(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? reading(sum(1)) : "zoom in", isCompass(one.panel) ? "-" : whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? reading(Math.min(...inside)) : "-", inside.length ? reading(Math.max(...inside)) : "-", String(one.total)];
         for (const words of cells) row.insertCell().textContent = words;
       }
       this.readout.replaceChildren(table);
