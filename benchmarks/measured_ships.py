@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest
-from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.warehouse.store import Warehouse
 

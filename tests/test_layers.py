@@ -38,6 +38,21 @@ ROOMS = {
     "history": {"distributions", "channels"},
     "simulate": set(),
 }
+#: What each room of the jobs may import of the others: none that imports it.
+JOBS = {
+    "state": set(),
+    "ingest": {"state"},
+    "inbox": {"state", "ingest"},
+    "corrections": {"state", "ingest"},
+    "identify": {"state", "ingest"},
+    "compare": {"ingest", "identify"},
+    "diagnose": {"identify", "compare"},
+    "steering": {"identify"},
+    "predict": {"ingest", "identify", "compare", "diagnose", "steering"},
+    "reprocess": {"state", "ingest", "identify"},
+    "repair": {"state", "ingest"},
+    "demo": {"ingest", "identify", "reprocess"},
+}
 #: What the warehouse may know of the pipeline: the types that it stores.
 STORED = tuple(f"kempf.pipeline.ingest.{name}." for name in ("decoded", "readings", "log_file"))
 #: Libraries with one door, and the files that are it.
@@ -118,6 +133,10 @@ def wrong(path: str, layer: str, module: str) -> Iterator[str]:
         there = inner.partition(".")[0]
         if here in ROOMS and there in ROOMS and there != here and there not in ROOMS[here]:
             yield f"pipeline.{here} imports {module}"
+    if path.startswith("flows/jobs/") and inner.startswith("jobs."):
+        here, there = path.split("/")[2], inner.split(".")[1]
+        if there != here and there not in JOBS[here]:
+            yield f"flows.jobs.{here} imports {module}"
 
 
 def sources() -> list[str]:
@@ -132,6 +151,11 @@ def test_every_layer_is_there():
 def test_every_room_of_the_pipeline_has_its_place():
     rooms = {p.split("/")[1].removesuffix(".py") for p in sources() if p.startswith("pipeline/")} - {"__init__"}
     assert rooms == set(ROOMS)
+
+
+def test_every_room_of_the_jobs_has_its_place():
+    rooms = {p.split("/")[2] for p in sources() if p.startswith("flows/jobs/")} - {"__init__.py"}
+    assert rooms == set(JOBS)
 
 
 @pytest.mark.parametrize("layer", BELOW)
@@ -180,10 +204,12 @@ def test_only_the_fleet_knows_prefect():
         ("pipeline/predict/a.py", "from kempf.pipeline.compare.misfit import where"),
         ("pipeline/compare/a.py", "from kempf.pipeline.diagnose.diagnosis import Diagnosis"),
         ("pipeline/channels/a.py", "from kempf.pipeline.segment.find_zigzags import find_zigzags"),
-        ("warehouse/a.py", "from kempf.flows.jobs import files"),
+        ("warehouse/a.py", "from kempf.flows.jobs.ingest import files"),
         ("warehouse/a.py", "from kempf.pipeline.estimate import estimators"),
         ("warehouse/a.py", "import kempf.workbench"),
         ("flows/a.py", "from kempf.workbench.terminal import number"),
+        ("flows/jobs/ingest/a.py", "from kempf.flows.jobs.inbox.take_inbox import take_inbox"),
+        ("flows/jobs/identify/a.py", "from kempf.flows.jobs.diagnose import add_effect"),
         ("flows/a.py", "from prefect import flow"),
         ("flows/a.py", "from importlib import import_module\nimport_module('kempf.workbench.cli')"),
         ("flows/a.py", "from importlib import import_module\nimport_module(f'kempf.workbench.{1}')"),

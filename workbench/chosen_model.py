@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, model_of, standing_model
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, Own, model_of, standing_model
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases
@@ -52,7 +52,7 @@ def named_model(warehouse: Warehouse, vessel: str, name: str, own: Own = NONE_OF
     NotFound
         ``no_parameter_set``, or there is no such file.
     UsageError
-        See `kempf.flows.jobs.files.read_model`.
+        See `kempf.flows.jobs.ingest.files.read_model`.
     """
     path = Path(name)
     if not path.exists() and (name.startswith("ps-") or name in aliases.of_vessel(warehouse, vessel)):

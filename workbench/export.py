@@ -13,7 +13,7 @@ import yaml
 from kempf.warehouse.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.ship_model import ShipOfSet
+    from kempf.flows.jobs.steering.ship_model import ShipOfSet
     from kempf.pipeline.steering.state_space import StateSpace
 
 #: bytes of the description at the head of a MAT file, which scipy fills with the time of day
@@ -38,7 +38,7 @@ def as_text(parameter_set: ParameterSet, form: str) -> str:
         CSV holds the parameters alone: group, name, value, std, unit; the group ``fitted_to_legs`` where predictions
         take these.
     """
-    from kempf.flows.jobs.leg_fit import by_name
+    from kempf.flows.jobs.identify.leg_fit import by_name
 
     if form == "csv":
         stream = io.StringIO()

@@ -43,7 +43,7 @@ NOWHERE: Mapping[str, tuple[Series, Series]] = MappingProxyType({})
 
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.flows.jobs.compare.compare_vessel import Comparison
 
 
 @dataclass(frozen=True)

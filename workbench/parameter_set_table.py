@@ -56,6 +56,6 @@ def print_by_likelihood(parameter_set: ParameterSet) -> None:
 
 def _of_legs(parameter_set: ParameterSet) -> dict[str, list[str]]:
     """Return value and standard error of each parameter fitted to legs, empty where predictions take no such ones."""
-    from kempf.flows.jobs.leg_fit import by_name
+    from kempf.flows.jobs.identify.leg_fit import by_name
 
     return {name: [number(value), number(std, 2)] for name, (value, std) in by_name(parameter_set).items()}

@@ -69,7 +69,7 @@ def compared(rungs: Sequence[Mapping[str, Any]]) -> list[Rung]:
         JSON content of a ladder, in order.
     """
     # what computes is not loaded by a command that prints its help
-    from kempf.flows.jobs.leg_fit import taken_by_predictions
+    from kempf.flows.jobs.identify.leg_fit import taken_by_predictions
 
     last: Mapping[str, Any] = rungs[-1] if rungs else {}
     by_legs = bool(last.get("effects")) and taken_by_predictions(last.get("one_leg_ahead"))

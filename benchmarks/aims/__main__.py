@@ -15,10 +15,10 @@ from benchmarks import measured_ships, result_page
 from benchmarks.aims.figures import FIGURES, shown
 from benchmarks.aims.prototype_units import Misfits, climbed, in_units, misfits
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.chosen_manoeuvres import choose_refreshed
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose_refreshed
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.shooting.windows import windows_of
 from kempf.schemas.model_spec import ModelSpec

@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks import measured_ships, result_page
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 

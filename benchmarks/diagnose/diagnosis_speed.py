@@ -13,11 +13,11 @@ from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.effects import Kind
 from benchmarks.diagnose.hidden_effects.write import logs_of
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_model, read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.ingest.files import read_model, read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.schemas.effects import catalogue

@@ -10,9 +10,9 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.chosen_manoeuvres import choose_refreshed
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose_refreshed
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.pipeline.diagnose.improves_prediction import better_ahead
 from kempf.pipeline.shooting.ahead import shooting_range
 from kempf.schemas import effects

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import diagnosed, section
-from kempf.flows.jobs.files import read_model
+from kempf.flows.jobs.ingest.files import read_model
 
 _MODEL = Path(__file__).parents[2] / "docs" / "models" / "tank.yaml"
 

@@ -15,10 +15,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import fit_plain

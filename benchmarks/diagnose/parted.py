@@ -32,11 +32,11 @@ from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.tally import Share
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from benchmarks.diagnose.one_hidden_effect import kept
-from kempf.flows.jobs.add_effect import add_effect
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.next_trial import next_trial
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.diagnose.add_effect import add_effect
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.predict.next_trial import next_trial
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import TrialSettings
 from kempf.schemas.errors import KempfError

@@ -15,10 +15,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, known_effects
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, known_effects
+from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.shooting.ahead import shooting_range

@@ -8,8 +8,8 @@ from tempfile import TemporaryDirectory
 
 from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import section
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.warehouse.store import Warehouse
 
 

@@ -19,10 +19,10 @@ from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects import programme, readings, sail
 from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
 from benchmarks.diagnose.late_rudder import LAG_S
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.stretch import Explained, explain

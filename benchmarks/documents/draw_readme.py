@@ -15,9 +15,9 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from kempf.flows.jobs.demonstrate import Demonstration, demonstrate
-from kempf.flows.jobs.identify_vessel import IdentifyOutcome
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.demo.demonstrate import Demonstration, demonstrate
+from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse

@@ -88,9 +88,9 @@ def changed(folder: Path, change: Change) -> Path:
 
 def fleet(folder: Path, logs_each: int) -> Path:
     """Simulate the fleet, take its logs in and identify every ship; return the warehouse."""
-    from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-    from kempf.flows.jobs.ingest_logs import ingest
-    from kempf.flows.jobs.pool_vessel import pool_vessel
+    from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+    from kempf.flows.jobs.identify.pool_vessel import pool_vessel
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
     from kempf.pipeline.simulate.logger_profile import logger_profile
     from kempf.pipeline.simulate.mcap_log import to_mcap
     from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

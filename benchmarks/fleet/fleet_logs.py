@@ -10,7 +10,7 @@ import gzip
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
-from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv

@@ -20,9 +20,9 @@ import numpy as np
 
 from benchmarks.fleet.kill import VESSEL, harbour, seen, take_in
 from benchmarks.result_page import table, write
-from kempf.flows.jobs.correct_segments import plan_for
-from kempf.flows.jobs.repair_warehouse import repair
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.corrections.correct_segments import plan_for
+from kempf.flows.jobs.repair.repair_warehouse import repair
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import notes, raw, segments
 from kempf.warehouse.store import Warehouse

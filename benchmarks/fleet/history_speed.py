@@ -49,8 +49,8 @@ class Template:
 
 def real_set(folder: Path) -> Template:
     """Sail one zigzag, take its log in, identify it."""
-    from kempf.flows.jobs.identify_vessel import identify_vessel
-    from kempf.flows.jobs.ingest_logs import ingest
+    from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
     from kempf.pipeline.simulate.logger_profile import logger_profile
     from kempf.pipeline.simulate.mcap_log import to_mcap
     from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

@@ -53,9 +53,9 @@ def harbour(folder: Path) -> Path:
 
 def take_in(warehouse: Warehouse, logs: Path) -> None:
     """Ingest the three logs and identify the ship."""
-    from kempf.flows.jobs.files import read_profiles
-    from kempf.flows.jobs.ingest_logs import ingest
-    from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+    from kempf.flows.jobs.ingest.files import read_profiles
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
+    from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 
     paths = [logs / f"day{k}.{ending}" for k, ending in enumerate(_ENDINGS)]
     outcomes = ingest(warehouse, paths, given=read_profiles([logs / "profile.yaml"]))
@@ -67,7 +67,7 @@ def take_in(warehouse: Warehouse, logs: Path) -> None:
 
 def bring_up_to_date(warehouse: Warehouse, logs: Path) -> None:
     """Change the profile and reprocess: every log is read anew, every zigzag found and identified anew."""
-    from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+    from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 
     vessels.register(warehouse, VESSEL, vessels.current(warehouse, VESSEL).model_copy(update={"wind_arm_per_m": 0.005}))
     report = reprocess_vessel(warehouse, VESSEL)
@@ -260,7 +260,9 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=25, help="of each job")
     parser.add_argument("--seed", type=int, default=9)
     options = parser.parse_args()
-    _SERVER.set_forkserver_preload(["kempf.flows.jobs.reprocess_vessel", "kempf.flows.jobs.ingest_logs"])
+    _SERVER.set_forkserver_preload(
+        ["kempf.flows.jobs.reprocess.reprocess_vessel", "kempf.flows.jobs.ingest.ingest_logs"]
+    )
     with TemporaryDirectory() as name:
         folder = Path(name)
         found = measure(folder, options.kills, options.seed, locally, jobs=tuple(JOBS), begin=folder / "nothing")

@@ -27,7 +27,7 @@ from benchmarks.fleet.kill import seen
 from benchmarks.fleet.torn_jobs import JOBS, OF_THEIR_OWN, command_of, harbour
 from benchmarks.fleet.torn_places import Place, Prepared, cut_newest, opened, warm_up
 from benchmarks.result_page import table, write
-from kempf.flows.jobs.repair_warehouse import repair
+from kempf.flows.jobs.repair.repair_warehouse import repair
 from kempf.schemas.errors import KempfError
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify

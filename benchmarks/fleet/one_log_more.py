@@ -17,8 +17,8 @@ from tempfile import TemporaryDirectory
 from time import process_time
 
 from benchmarks import result_page
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile

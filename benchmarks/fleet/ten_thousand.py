@@ -24,9 +24,9 @@ import polars as pl
 from benchmarks import result_page
 from benchmarks.fleet.one_log_more import VESSEL, take_in
 from kempf.flows.fleet.plan import do_batch, plan
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.vessel_report import VesselReport
-from kempf.flows.jobs.vessel_state import fleet_state
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.vessel_report import VesselReport
+from kempf.flows.jobs.state.vessel_state import fleet_state
 from kempf.warehouse import delta, history, runs, vessels
 from kempf.warehouse.compaction import compact
 from kempf.warehouse.keys import one_of, vessel_key

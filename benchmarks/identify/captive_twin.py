@@ -19,14 +19,14 @@ import numpy as np
 from benchmarks import result_page
 from benchmarks.baselines.mmg_standard import Peer
 from benchmarks.identify import peers
-from kempf.flows.jobs.checked_prediction import predict_checked
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_model, read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, point
+from kempf.flows.jobs.identify.vessel_model import store_model
+from kempf.flows.jobs.ingest.files import read_model, read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.predict.checked_prediction import predict_checked
+from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse

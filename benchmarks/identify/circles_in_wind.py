@@ -21,13 +21,13 @@ import numpy as np
 from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects.tally import Share
 from benchmarks.identify.prediction.plain_ship import drawn, taken_in
-from kempf.flows.jobs import as_sailed
-from kempf.flows.jobs.checked_prediction import CheckedPredictions
-from kempf.flows.jobs.compare_predicted import Beside, measured_beside
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.predict import as_sailed
+from kempf.flows.jobs.predict.checked_prediction import CheckedPredictions
+from kempf.flows.jobs.predict.compare_predicted import Beside, measured_beside
+from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, TurningCircle

@@ -22,7 +22,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 from benchmarks import result_page
-from kempf.flows.jobs.steered_ship import SteeredShip
+from kempf.flows.jobs.steering.steered_ship import SteeredShip
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.paper import least_squares

@@ -21,10 +21,10 @@ from typing import TypeVar
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.demonstrate import demonstrate
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.parameter_set_of import arm_of
+from kempf.flows.jobs.demo.demonstrate import demonstrate
+from kempf.flows.jobs.identify.parameter_set_of import arm_of
+from kempf.flows.jobs.ingest.files import read_model
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood

@@ -17,9 +17,9 @@ from benchmarks import measured_ships, result_page
 from benchmarks.identify import plausibility
 from benchmarks.identify.draw_parameters import Cloud, draw_parameters
 from benchmarks.measured_ships import Run, ordered
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_vessel
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, Request, identify_vessel
+from kempf.flows.jobs.ingest.files import read_model
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.estimate.filters.linear_kernel import FASTEST_PER_S
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.model_spec import HULL_PARAMETERS

@@ -19,8 +19,8 @@ from benchmarks.identify import plausibility
 from benchmarks.identify.draw_held_out import draw_held_out
 from benchmarks.identify.linear_free_run import LinearFreeRun, free_run
 from benchmarks.measured_ships import ordered
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.ingest.files import read_model
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.cut import make_record

@@ -23,13 +23,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.demonstrate import demonstrate
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.standing_model import Own
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.demo.demonstrate import demonstrate
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel
+from kempf.flows.jobs.identify.standing_model import Own
+from kempf.flows.jobs.identify.vessel_model import store_model
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import segments
 from kempf.warehouse.parameter_set import ParameterSet

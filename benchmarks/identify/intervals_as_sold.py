@@ -25,8 +25,8 @@ from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.schemas.confidence import NORMAL_95

@@ -24,8 +24,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, shaft_speed

@@ -20,8 +20,8 @@ from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import Signal
 from kempf.pipeline.diagnose.staged import staged

@@ -1,6 +1,6 @@
 """Where the paper's procedure works and where it does not: ``python -m benchmarks.identify.paper_map``.
 
-The experiment of `flows.jobs.reproduce_paper`, mapped over measurement noise and over how much force and current
+The experiment of `flows.jobs.demo.reproduce_paper`, mapped over measurement noise and over how much force and current
 vary: how it ends, how far off it is, and how much of that the theory of errors in the regressors predicts.
 """
 

@@ -13,7 +13,7 @@ import yaml
 
 from benchmarks import result_page
 from benchmarks.baselines.mmg_standard import Peer
-from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.jobs.predict.predicted import Predicted
 
 _FILE = Path(__file__).parents[1] / "peers" / "kvlcc2.yaml"
 _RUDDER_RAD = radians(35.0)

@@ -19,17 +19,17 @@ import numpy as np
 from benchmarks import measured_ships, result_page
 from benchmarks.identify import peers
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.as_sailed import as_sailed
-from kempf.flows.jobs.checked_prediction import predict_checked
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre, beside, measured_beside
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.predicted import Predicted
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, point
+from kempf.flows.jobs.identify.vessel_model import store_model
+from kempf.flows.jobs.ingest.files import read_model
+from kempf.flows.jobs.predict.as_sailed import as_sailed
+from kempf.flows.jobs.predict.checked_prediction import predict_checked
+from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre, beside, measured_beside
+from kempf.flows.jobs.predict.predict_request import PredictRequest
+from kempf.flows.jobs.predict.predicted import Predicted
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec

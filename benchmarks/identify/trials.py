@@ -17,11 +17,11 @@ from benchmarks import measured_ships, result_page
 from benchmarks.identify import plausibility
 from benchmarks.identify.draw_ship import Day, draw_ship
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import IdentifyOutcome, identify_vessel
-from kempf.flows.jobs.ingest_logs import IngestOutcome
-from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.rerun_set import Rerun, rerun
+from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, identify_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome
+from kempf.flows.jobs.ingest.log_channels import channels_of
+from kempf.flows.jobs.reprocess.rerun_set import Rerun, rerun
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse

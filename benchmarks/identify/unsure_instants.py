@@ -18,9 +18,9 @@ import numpy as np
 
 from benchmarks import measured_ships, result_page
 from benchmarks.identify.prediction import plain_ship
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
 from kempf.pipeline.channels.instant_errors import InstantErrors
 from kempf.pipeline.channels.series import Float

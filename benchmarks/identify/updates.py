@@ -18,11 +18,11 @@ from time import process_time
 import numpy as np
 
 from benchmarks import measured_ships, result_page
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.update_model import FEWEST, GROWN
-from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.update_model import FEWEST, GROWN
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.agreement import agreement_of

@@ -18,10 +18,10 @@ from benchmarks import measured_ships, result_page
 from benchmarks.identify import plausibility
 from benchmarks.identify.draw_predicted import draw_predicted
 from benchmarks.identify.linear_ahead import predict_ahead
-from kempf.flows.jobs.identify_vessel import IdentifyOutcome, identify_vessel
-from kempf.flows.jobs.ingest_logs import IngestOutcome
-from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome
+from kempf.flows.jobs.ingest.log_channels import channels_of
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, search
 from kempf.pipeline.estimate.record.cut import make_record

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import measured_ships
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.channels.series import Series

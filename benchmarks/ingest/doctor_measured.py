@@ -15,7 +15,7 @@ from pathlib import Path
 
 from benchmarks import measured_ships, result_page
 from benchmarks.ingest.doctor_traps import examined
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
 

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from benchmarks import measured_ships
-from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
+from kempf.flows.jobs.ingest.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.profile import VesselProfile, parse

@@ -99,7 +99,7 @@ def whole_reading(path: Path) -> int:
 
 def taking_in(path: Path) -> int:
     """Take a log into a warehouse, all of it: `kempf ingest`."""
-    from kempf.flows.jobs.ingest_logs import ingest
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
     from kempf.schemas.profile import VesselProfile
     from kempf.warehouse.store import Warehouse
 

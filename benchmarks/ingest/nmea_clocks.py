@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from benchmarks import result_page
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.nmea_log import checksum, to_nmea

@@ -103,9 +103,9 @@ class TimedReading(Stopwatch):
 
 def job(log: Path, profile_path: Path, folder: Path) -> dict[str, float]:
     """Time the main job on one log, in this process, s; storing is what reading and segmenting leave of the ingest."""
-    from kempf.flows.jobs import ingest_logs
-    from kempf.flows.jobs.files import read_profiles
-    from kempf.flows.jobs.identify_vessel import identify_vessel
+    from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+    from kempf.flows.jobs.ingest import ingest_logs
+    from kempf.flows.jobs.ingest.files import read_profiles
     from kempf.pipeline.ingest.read import read_parts
     from kempf.warehouse.store import Warehouse
 

@@ -29,15 +29,15 @@ from kempf.flows.fleet import arrivals, plan
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.hooks import HOOKS
-from kempf.flows.jobs import ingest_logs
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import logs_in, read_profiles, read_quality
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
-from kempf.flows.jobs.take_inbox import InboxRun, NeedsAPerson, take_inbox
-from kempf.flows.jobs.vessel_report import VesselReport
-from kempf.flows.jobs.vessel_state import responsible_code
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.pool_vessel import not_pooled, pool_vessel
+from kempf.flows.jobs.inbox.take_inbox import InboxRun, NeedsAPerson, take_inbox
+from kempf.flows.jobs.ingest import ingest_logs
+from kempf.flows.jobs.ingest.files import logs_in, read_profiles, read_quality
+from kempf.flows.jobs.reprocess.vessel_report import VesselReport
+from kempf.flows.jobs.state.vessel_state import responsible_code
 from kempf.flows.process.configuration import setting
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
@@ -99,7 +99,7 @@ def ingest(
     -------
     list of dict or State
         One outcome a log; where the run ends as Failed a caller gets the error, `arrivals.LogsFailed` or
-        `kempf.flows.jobs.take_inbox.NeedsAPerson`, which has them too.
+        `kempf.flows.jobs.inbox.take_inbox.NeedsAPerson`, which has them too.
     """
     if vessel is None and not profiles:
         runs = [inbox_task(warehouse, folder) for folder in paths]

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessels
-from kempf.flows.jobs.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
-from kempf.flows.jobs.vessel_state import VesselState, fleet_state, responsible_code
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessels
+from kempf.flows.jobs.reprocess.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
+from kempf.flows.jobs.state.vessel_state import VesselState, fleet_state, responsible_code
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped

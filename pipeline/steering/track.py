@@ -1,7 +1,7 @@
 """A ship on her course under a law: the loop, what it recorded, and the numbers that are compared.
 
 The ship is any `SteerableShip`: the loop knows what her instruments show and what rudder it orders, and shares no
-dynamics with her. `kempf.flows.jobs.steered_ship` is the simulator as one.
+dynamics with her. `kempf.flows.jobs.steering.steered_ship` is the simulator as one.
 """
 
 from __future__ import annotations

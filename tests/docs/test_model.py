@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from kempf.flows.jobs.files import read_model
+from kempf.flows.jobs.ingest.files import read_model
 from kempf.schemas.model_spec import ModelSpec
 from tests.docs.console import blocks
 

@@ -34,7 +34,7 @@ def test_the_numbers_are_those_of_the_code() -> None:
 
 
 def test_every_code_is_raised() -> None:
-    sources = [*(ROOT / "flows" / "jobs").glob("*.py"), *(ROOT / "pipeline" / "manoeuvre").rglob("*.py")]
+    sources = [*(ROOT / "flows" / "jobs").rglob("*.py"), *(ROOT / "pipeline" / "manoeuvre").rglob("*.py")]
     text = "".join(path.read_text(encoding="utf-8") for path in [*sources, ROOT / "workbench" / "cli" / "predict.py"])
     rows = TEXT.partition("## Refusals")[2]
     for code in re.findall(r"`([a-z]+(?:_[a-z]+)+)`", rows):

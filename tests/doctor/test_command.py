@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.parameter_set_of import channel_warnings
+from kempf.flows.jobs.identify.parameter_set_of import channel_warnings
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.warehouse import examinations, logs
 from kempf.warehouse.store import Warehouse
 from tests.doctor import closed_form_ship
@@ -75,9 +75,9 @@ def test_a_doctor_who_fails_costs_no_log(folder: Path, monkeypatch: pytest.Monke
     def broken(*_: object) -> None:
         raise ZeroDivisionError("nothing to divide by")
 
-    monkeypatch.setattr("kempf.flows.jobs.search_log.examine_instruments", broken)
+    monkeypatch.setattr("kempf.flows.jobs.ingest.search_log.examine_instruments", broken)
     place = Warehouse(str(folder / "warehouse"))
-    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest.files import read_profiles
 
     (outcome,) = ingest(place, [folder / "made.csv"], "made", read_profiles([folder / "right.yaml"]))
     assert outcome.error is None

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
+from kempf.flows.jobs.ingest.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.corrections import Correction, put_into
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings

@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks import measured_ships
 from benchmarks.ingest.doctor_traps import examined
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.channels.doctor.examine import examine
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.series import Series

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from kempf.flows.jobs.examine_log import examine_instruments
+from kempf.flows.jobs.ingest.examine_log import examine_instruments
 from kempf.pipeline.channels.doctor.examine import Examination, examine
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.outcome import Outcome

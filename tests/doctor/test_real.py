@@ -48,7 +48,7 @@ def test_the_antenna_is_62_to_78_degrees_off_the_bow() -> None:
 @pytest.mark.parametrize("ship", ["aurora", "gannet"])
 def test_honest_logs_are_clean(ship: str) -> None:
     from benchmarks.measured_ships import fleet
-    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest.files import read_profiles
 
     if not (SHARED / "trials").is_dir():
         pytest.skip(f"the trial logs in {SHARED} are not here")

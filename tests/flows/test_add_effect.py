@@ -8,8 +8,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from kempf.flows.jobs import add_effect as job
-from kempf.flows.jobs import vessel_model
+from kempf.flows.jobs.diagnose import add_effect as job
+from kempf.flows.jobs.identify import vessel_model
 from kempf.pipeline.diagnose import improves_prediction
 from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel

@@ -10,16 +10,16 @@ from shutil import copytree
 import numpy as np
 import pytest
 
-from kempf.flows.jobs import errors_of_fit, update_model
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.remove_logs import remove
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_all import verify_all
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, POOLED
-from kempf.flows.jobs.vessel_model import POSTERIOR, store_model
+from kempf.flows.jobs.corrections.remove_logs import remove
+from kempf.flows.jobs.identify import errors_of_fit, update_model
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, POOLED
+from kempf.flows.jobs.identify.vessel_model import POSTERIOR, store_model
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_all import verify_all
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.estimate.posterior import from_json
 from kempf.pipeline.ingest.log_file import LogFile

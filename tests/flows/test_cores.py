@@ -24,7 +24,12 @@ import {module}
 
 
 @pytest.mark.parametrize(
-    "module", ["kempf.flows.fleet.flows", "kempf.flows.jobs.reprocess_vessel", "kempf.flows.jobs.compare_vessel"]
+    "module",
+    [
+        "kempf.flows.fleet.flows",
+        "kempf.flows.jobs.reprocess.reprocess_vessel",
+        "kempf.flows.jobs.compare.compare_vessel",
+    ],
 )
 @pytest.mark.parametrize("wanted", [None, "3"])
 def test_numpy_begins_with_one_thread_unless_asked_otherwise(module: str, wanted: str | None) -> None:

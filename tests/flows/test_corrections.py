@@ -10,16 +10,16 @@ from types import ModuleType
 import pytest
 
 from kempf.flows.fleet.plan import plan
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.correct_segments import plan_for, plan_new
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.out_of_date import unsearched
-from kempf.flows.jobs.remove_logs import rename_vessel
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import model_of, standing
+from kempf.flows.jobs.corrections.correct_segments import plan_for, plan_new
+from kempf.flows.jobs.corrections.remove_logs import rename_vessel
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.identify.standing_model import model_of, standing
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
+from kempf.flows.jobs.state.out_of_date import unsearched
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, examinations, history, logs, notes, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
@@ -234,7 +234,7 @@ def test_bounds_that_are_none(warehouse: Warehouse) -> None:
 
 def test_a_manoeuvre_that_newer_code_does_not_find(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
     (zigzag,) = segments.current(warehouse, "mariner")
-    monkeypatch.setattr("kempf.flows.jobs.find_segments.find_zigzags", lambda *arguments: [])
+    monkeypatch.setattr("kempf.flows.jobs.ingest.find_segments.find_zigzags", lambda *arguments: [])
     with pytest.raises(NotFound, match="finds nothing any more") as gone:
         plan_for(warehouse, zigzag.segment_id, "exclude", "engine slowed")
     assert gone.value.code == "manoeuvre_gone" and corrections.all_of(warehouse) == []

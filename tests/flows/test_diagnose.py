@@ -15,9 +15,9 @@ from prefect.logging import disable_run_logger
 from benchmarks.diagnose import late_rudder
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.flows import diagnose_batch
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import code_changed, inputs_of, rerun
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import code_changed, inputs_of, rerun
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse

@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import pytest
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
-from kempf.flows.jobs.vessel_model import errors_in_words, store_model
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.identify.vessel_model import errors_in_words, store_model
 from kempf.flows.process.fit_report import FitReport, reported_to
 from kempf.flows.process.progress import Figures, silent
 from kempf.pipeline.estimate.iteration import SILENT, Iteration

@@ -166,7 +166,7 @@ def damage(warehouse: Warehouse, vessel: str) -> None:
 
 def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     from kempf.flows.fleet.flows import reports_of
-    from kempf.flows.jobs import reprocess_vessel
+    from kempf.flows.jobs.reprocess import reprocess_vessel
 
     def one(warehouse: Warehouse, vessel: str, *rest: Any) -> Any:
         if vessel == "ferry":

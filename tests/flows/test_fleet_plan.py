@@ -11,11 +11,11 @@ import pytest
 from kempf.flows.fleet import plan as planning
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
-from kempf.flows.jobs import vessel_state
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.vessel_report import VesselReport, run_id_of
-from kempf.flows.jobs.vessel_state import fleet_state as state_of
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess.vessel_report import VesselReport, run_id_of
+from kempf.flows.jobs.state import vessel_state
+from kempf.flows.jobs.state.vessel_state import fleet_state as state_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
@@ -85,7 +85,7 @@ def test_everything_that_a_result_rests_on_makes_her_due(own: Warehouse, ferry: 
 
 
 def test_a_log_that_comes_while_she_is_worked_on_leaves_her_due(own: Warehouse, ferry: Ship, monkeypatch: Any) -> None:
-    from kempf.flows.jobs import reprocess_vessel
+    from kempf.flows.jobs.reprocess import reprocess_vessel
 
     real = reprocess_vessel._withdraw
 
@@ -104,7 +104,7 @@ def test_a_log_that_comes_while_she_is_worked_on_leaves_her_due(own: Warehouse, 
 
 def refuse(monkeypatch: Any, error: KempfError) -> None:
     """Let every vessel but the idle one fail so."""
-    from kempf.flows.jobs import reprocess_vessel
+    from kempf.flows.jobs.reprocess import reprocess_vessel
 
     real = reprocess_vessel._withdraw
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnose import late_rudder
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.vessel_model import _at_bounds
+from kempf.flows.jobs.identify.vessel_model import _at_bounds
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import catalogue

@@ -11,9 +11,9 @@ import pytest
 import yaml
 
 from kempf.flows.fleet.arrivals import LogsFailed
-from kempf.flows.jobs.release_log import dismiss, release
-from kempf.flows.jobs.remove_logs import remove, remove_vessel, rename_vessel
-from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
+from kempf.flows.jobs.corrections.remove_logs import remove, remove_vessel, rename_vessel
+from kempf.flows.jobs.inbox.release_log import dismiss, release
+from kempf.flows.jobs.inbox.take_inbox import NeedsAPerson, take_inbox
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.warehouse import inbox, logs, vessels
 from kempf.warehouse.source_folder import SourceFolder
@@ -281,7 +281,7 @@ def test_a_file_that_could_not_be_read_for_a_moment_is_tried_again(
         raise KempfError("file_unreadable", "The share did not answer.", "Look at it.")
 
     with monkeypatch.context() as patched:
-        patched.setattr("kempf.flows.jobs.take_inbox.ingest_log", failing)
+        patched.setattr("kempf.flows.jobs.inbox.take_inbox.ingest_log", failing)
         assert len(taken(place, warehouse).quarantined) == 2
     assert [Path(one.path).name for one in taken(place, warehouse).ingested] == ["day.csv.gz"]
 
@@ -291,7 +291,7 @@ def test_a_full_disk_is_no_files_fault(place: Path, warehouse: Warehouse, monkey
         raise KempfError("disk_full", "There is no room left.", "Make room on it.")
 
     with monkeypatch.context() as patched:
-        patched.setattr("kempf.flows.jobs.take_inbox.ingest_log", full)
+        patched.setattr("kempf.flows.jobs.inbox.take_inbox.ingest_log", full)
         with pytest.raises(KempfError) as found:
             taken(place, warehouse)
     assert found.value.code == "disk_full"

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import delta, logs, segments
 from kempf.warehouse.store import Warehouse

@@ -8,13 +8,13 @@ from shutil import copytree
 import pytest
 import yaml
 
-from kempf.flows.jobs.files import read_model, read_profiles
-from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel, inputs_of
-from kempf.flows.jobs.ingest_logs import ingest, settle_vessel
-from kempf.flows.jobs.parameter_set_of import SetRequest
-from kempf.flows.jobs.register_vessel import set_vessel
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.identify.identify_vessel import Request, build, identify_vessel, inputs_of
+from kempf.flows.jobs.identify.parameter_set_of import SetRequest
+from kempf.flows.jobs.ingest.files import read_model, read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest, settle_vessel
+from kempf.flows.jobs.ingest.register_vessel import set_vessel
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.errors import KempfError, NotFound, UsageError

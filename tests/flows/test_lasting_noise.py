@@ -11,11 +11,11 @@ import pytest
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from benchmarks.identify.intervals_as_sold import hull_of, in_std
-from kempf.flows.jobs import errors_of_fit
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.identify import errors_of_fit
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.diagnose import instrument_noise
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.schemas.instrument_noise import NAMES

@@ -8,9 +8,9 @@ from shutil import copytree
 import pytest
 
 from benchmarks.diagnose.late_rudder import VESSEL
-from kempf.flows.jobs import predict_vessel
-from kempf.flows.jobs.next_trial import next_trial
-from kempf.flows.jobs.rival_models import Rivals
+from kempf.flows.jobs.diagnose.rival_models import Rivals
+from kempf.flows.jobs.predict import predict_vessel
+from kempf.flows.jobs.predict.next_trial import next_trial
 from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
-from kempf.flows.jobs.one_sided import one_sided
+from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre
+from kempf.flows.jobs.predict.one_sided import one_sided
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 

@@ -8,22 +8,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kempf.flows.jobs import as_sailed as as_sailed_job
-from kempf.flows.jobs.as_sailed import as_sailed
-from kempf.flows.jobs.chosen_manoeuvres import Chosen
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.loads_of_logs import loads_beside
-from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
-from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
-from kempf.flows.jobs.prediction_basis import basis_of, identified
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.ship_model import ship_of_set
-from kempf.flows.jobs.standing_model import POOLED
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.loads_of_logs import loads_beside
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.identify.standing_model import POOLED
+from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.predict import as_sailed as as_sailed_job
+from kempf.flows.jobs.predict.as_sailed import as_sailed
+from kempf.flows.jobs.predict.predict_request import PredictRequest
+from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
+from kempf.flows.jobs.predict.prediction_basis import basis_of, identified
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
+from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.zigzag import Zigzag

@@ -8,16 +8,16 @@ from shutil import copytree
 import polars as pl
 import pytest
 
-from kempf.flows.jobs import purge_logs
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.purge_logs import purge, what_goes
-from kempf.flows.jobs.remove_logs import move, remove, restore
-from kempf.flows.jobs.repair_warehouse import repair
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_all import verify_all
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.corrections import purge_logs
+from kempf.flows.jobs.corrections.purge_logs import purge, what_goes
+from kempf.flows.jobs.corrections.remove_logs import move, remove, restore
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.repair.repair_warehouse import repair
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_all import verify_all
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse import compaction, delta, diagnoses, history, logs, parameter_sets, purges, raw, readings
 from kempf.warehouse.keys import vessel_key

@@ -12,10 +12,10 @@ import pytest
 
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.plan import do_fleet
-from kempf.flows.jobs.files import read_profiles, read_quality
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.vessel_quality import marks, quality_of
+from kempf.flows.jobs.ingest.files import read_profiles, read_quality
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.vessel_quality import marks, quality_of
 from kempf.schemas.errors import UsageError
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Limits, Quality
 from kempf.warehouse import logs, parameter_sets, segments

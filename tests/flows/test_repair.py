@@ -10,14 +10,14 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs.correct_segments import plan_for
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.former_vessel import former_vessels
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.purge_logs import purge
-from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
-from kempf.flows.jobs.repair_warehouse import repair
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.corrections.correct_segments import plan_for
+from kempf.flows.jobs.corrections.purge_logs import purge
+from kempf.flows.jobs.corrections.remove_logs import move, remove, remove_vessel, rename_vessel, restore
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.repair.repair_warehouse import repair
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.state.former_vessel import former_vessels
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import (
@@ -337,7 +337,7 @@ def test_a_repair_that_was_cut_off_is_finished_by_the_next(
     for path in files(warehouse, "segments"):
         flipped(path)
     with monkeypatch.context() as patched:
-        patched.setattr("kempf.flows.jobs.repair_warehouse._profiles", cut_off)
+        patched.setattr("kempf.flows.jobs.repair.repair_warehouse._profiles", cut_off)
         with pytest.raises(KeyboardInterrupt):
             repair(warehouse)
     assert [one.where for one in verify(warehouse)] == ["damaged/unfinished.json"]

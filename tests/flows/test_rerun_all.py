@@ -10,16 +10,17 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.flows.jobs import preview_code, rerun_all, vessel_state
-from kempf.flows.jobs.adopt_code import adopt_code
-from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.out_of_date import said_of_vessel
-from kempf.flows.jobs.parameter_changes import Move, paired
-from kempf.flows.jobs.preview_code import VesselPreview, preview_all, standing_sets
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_all import verify_all
-from kempf.flows.jobs.rerun_set import inputs_of
+from kempf.flows.jobs.identify.identify_vessel import Request, build, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess import preview_code, rerun_all
+from kempf.flows.jobs.reprocess.adopt_code import adopt_code
+from kempf.flows.jobs.reprocess.parameter_changes import Move, paired
+from kempf.flows.jobs.reprocess.preview_code import VesselPreview, preview_all, standing_sets
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_all import verify_all
+from kempf.flows.jobs.reprocess.rerun_set import inputs_of
+from kempf.flows.jobs.state import vessel_state
+from kempf.flows.jobs.state.out_of_date import said_of_vessel
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
@@ -217,7 +218,7 @@ def test_what_code_would_change_is_given_in_standard_errors(own: Warehouse, monk
         beside = [replace(e, value=e.value + steps.get(e.name, 0.0) * (e.std or 0.0)) for e in made.parameters]
         return replace(made, parameters=tuple(beside))
 
-    monkeypatch.setattr("kempf.flows.jobs.identify_vessel.build", moved)
+    monkeypatch.setattr("kempf.flows.jobs.identify.identify_vessel.build", moved)
     assert own.folder is not None
     before = tree(own.folder)
     output = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")

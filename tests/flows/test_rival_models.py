@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs import rival_models
-from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.diagnose import rival_models
+from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import diagnoses, parameter_sets
 from kempf.warehouse.diagnoses import StoredDiagnosis

@@ -12,8 +12,8 @@ import polars as pl
 import pytest
 import yaml
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.compare_vessel import compare_vessel
+from kempf.flows.jobs.compare.compare_vessel import compare_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.logger_profile import logger_profile

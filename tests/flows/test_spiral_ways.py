@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from kempf.flows.jobs.spiral_ways import orders_of, rates_of
+from kempf.flows.jobs.predict.spiral_ways import orders_of, rates_of
 from kempf.warehouse.segments import Segment
 from tests.warehouse.samples import segment
 

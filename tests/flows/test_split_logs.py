@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.store import Warehouse
 from tests.ingest.test_mcap import CHANNELS, plain, write

@@ -9,9 +9,9 @@ from typing import Any
 import polars as pl
 import pytest
 
-from kempf.flows.jobs import spool
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.ingest import spool
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap import decode
 from kempf.schemas.errors import DataRejected

@@ -13,10 +13,10 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.warehouse import delta, history, logs, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import RUNS, fresh

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from kempf.flows.jobs.files import read_model, read_profiles
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import standing_model
+from kempf.flows.jobs.identify.standing_model import standing_model
+from kempf.flows.jobs.ingest.files import read_model, read_profiles
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile, parse

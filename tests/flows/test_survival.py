@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import delta
 from kempf.warehouse.store import Warehouse
@@ -115,7 +115,7 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     moments = [(2, int(signal.SIGTERM)), (4, int(signal.SIGINT)), (6, int(signal.SIGTERM)), (8, int(signal.SIGINT))]
     code = (
         "import os, sys\n"
-        "import deltalake, polars, pyarrow.fs, kempf.flows.jobs.ingest_logs, kempf.workbench.cli.ingest\n"
+        "import deltalake, polars, pyarrow.fs, kempf.flows.jobs.ingest.ingest_logs, kempf.workbench.cli.ingest\n"
         "from kempf.warehouse import delta\n"
         "from kempf.warehouse.store import Warehouse\n"
         "from kempf.workbench.cli import main\n"

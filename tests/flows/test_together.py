@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs import reprocess_vessel as job
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel, reprocess_vessels
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess import reprocess_vessel as job
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel, reprocess_vessels
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile

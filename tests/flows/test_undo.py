@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from kempf.flows.fleet.plan import plan
-from kempf.flows.jobs import remove_logs
-from kempf.flows.jobs.affected_sets import of_logs
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.former_vessel import former_vessels
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.corrections import remove_logs
+from kempf.flows.jobs.corrections.affected_sets import of_logs
+from kempf.flows.jobs.corrections.remove_logs import move, remove, remove_vessel, rename_vessel, restore
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.state.former_vessel import former_vessels
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.warehouse import aliases, history, logs, notes, parameter_sets, raw, segments, vessels
 from kempf.warehouse.store import Warehouse

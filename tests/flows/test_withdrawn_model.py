@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.ingest_logs import ingest_log
-from kempf.flows.jobs.pending import Waiting
-from kempf.flows.jobs.remove_logs import rename_vessel
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.standing_model import POOLED, standing_model, undo
-from kempf.flows.jobs.vessel_report import VesselReport
+from kempf.flows.jobs.corrections.remove_logs import rename_vessel
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.pending import Waiting
+from kempf.flows.jobs.identify.standing_model import POOLED, standing_model, undo
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.vessel_report import VesselReport
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Tally
 from kempf.pipeline.simulate.csv_log import to_csv

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import yaml
 
-from kempf.flows.jobs.chosen_manoeuvres import Chosen, without_log
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
-from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.no_speed_log import KEY, estimate_of
-from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, without_log
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel, inputs_of
+from kempf.flows.jobs.identify.no_speed_log import KEY, estimate_of
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.simulate.csv_log import to_csv

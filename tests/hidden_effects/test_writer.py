@@ -45,8 +45,8 @@ def test_the_sample_is_balanced_and_large_enough(sample):
 
 
 def test_the_flows_take_a_case_in_and_find_its_zigzags(written, tmp_path: Path):
-    from kempf.flows.jobs.files import read_profiles
-    from kempf.flows.jobs.ingest_logs import ingest
+    from kempf.flows.jobs.ingest.files import read_profiles
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
 
     for case, folder, answer in written:
         warehouse = Warehouse(str(tmp_path / case.case_id))

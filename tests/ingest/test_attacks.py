@@ -12,7 +12,7 @@ import polars as pl
 import pytest
 import zstandard
 
-from kempf.flows.jobs.files import opened_log, read_bytes, read_profiles
+from kempf.flows.jobs.ingest.files import opened_log, read_bytes, read_profiles
 from kempf.pipeline.ingest.text.times import decimal_times
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError

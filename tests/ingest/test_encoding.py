@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from kempf.flows.jobs.draft_profile import draft
+from kempf.flows.jobs.ingest.draft_profile import draft
 from kempf.pipeline.ingest.encoding import utf16_of
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from mcap.writer import Writer
 
-from kempf.flows.jobs.draft_profile import draft
-from kempf.flows.jobs.files import logs_in
+from kempf.flows.jobs.ingest.draft_profile import draft
+from kempf.flows.jobs.ingest.files import logs_in
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.test_mcap import START, plain, profile, read, write

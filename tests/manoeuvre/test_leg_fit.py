@@ -11,9 +11,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.leg_fit import fitted_to_legs
-from kempf.flows.jobs.ship_model import ship_of_set
-from kempf.flows.jobs.standing_model import standing
+from kempf.flows.jobs.identify.leg_fit import fitted_to_legs
+from kempf.flows.jobs.identify.standing_model import standing
+from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse import parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet

@@ -68,7 +68,10 @@ def test_what_is_handed_out_is_there() -> None:
 
 def test_what_computes_starts_without_the_slow_half_of_scipy() -> None:
     # what they need of it is in pipeline/distributions.py and pipeline/channels/recursion.py
-    jobs = ("identify_vessel", "pool_vessel", "diagnose_vessel", "checked_prediction", "compare_vessel", "ingest_logs")
+    jobs = (
+        *("ingest.ingest_logs", "identify.identify_vessel", "identify.pool_vessel", "compare.compare_vessel"),
+        *("diagnose.diagnose_vessel", "predict.checked_prediction"),
+    )
     code = "import sys; " + "; ".join(f"import kempf.flows.jobs.{job}" for job in jobs) + "; print(*sys.modules)"
     found = set(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split())
     assert "scipy.special" in found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
 from kempf.warehouse import parameter_sets
 from tests.real_data.voyage import Voyage
 

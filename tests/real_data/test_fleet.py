@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from tests.real_data.voyage import SHARED, Voyage
 from tests.segment.loading import load
 from tests.segment.test_measured import independent_start

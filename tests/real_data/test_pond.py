@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.identify_vessel import Request, build, inputs_of
-from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest
-from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.parameter_set_of import SetRequest
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.identify_vessel import Request, build, inputs_of
+from kempf.flows.jobs.identify.parameter_set_of import SetRequest
+from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import vessels
 from kempf.warehouse.store import Warehouse

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.default_model import default_model_of
-from kempf.flows.jobs.diagnose_vessel import examine
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, known_effects
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.diagnose.diagnose_vessel import examine
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, known_effects
+from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.process.progress import silent
 from kempf.pipeline.diagnose.improves_prediction import better_ahead
 from kempf.pipeline.diagnose.joint import better_together

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.compare_predicted import measured_beside
-from kempf.flows.jobs.compare_vessel import compare_vessel
-from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.compare.compare_vessel import compare_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.identify.vessel_model import store_model
+from kempf.flows.jobs.ingest.files import read_model
+from kempf.flows.jobs.predict.compare_predicted import measured_beside
+from kempf.flows.jobs.predict.predict_request import PredictRequest
+from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
 from tests.real_data.voyage import Voyage
 
 MODEL = Path(__file__).parents[2] / "docs" / "models" / "pond.yaml"

@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.identify.hsva import PUBLISHED
 from benchmarks.measured_ships import ordered
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.identify_vessel import Request, build, inputs_of
-from kempf.flows.jobs.parameter_set_of import SetRequest
+from kempf.flows.jobs.identify.identify_vessel import Request, build, inputs_of
+from kempf.flows.jobs.identify.parameter_set_of import SetRequest
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.warehouse import readings
 from tests.real_data.voyage import Voyage

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.warehouse import segments
 from tests.real_data.voyage import SHARED, Voyage
 

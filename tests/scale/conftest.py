@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import vessels

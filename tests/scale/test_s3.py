@@ -14,14 +14,14 @@ import polars as pl
 import pytest
 import yaml
 
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.purge_logs import purge
-from kempf.flows.jobs.release_log import release
-from kempf.flows.jobs.repair_warehouse import repair
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.take_inbox import take_inbox
+from kempf.flows.jobs.corrections.purge_logs import purge
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.inbox.release_log import release
+from kempf.flows.jobs.inbox.take_inbox import take_inbox
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.repair.repair_warehouse import repair
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.profile import VesselProfile

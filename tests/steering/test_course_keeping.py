@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from kempf.flows.jobs.steered_ship import ShipInstruments, SteeredShip
+from kempf.flows.jobs.steering.steered_ship import ShipInstruments, SteeredShip
 from kempf.pipeline.estimate.filters.kalman_filter import run_filter
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.steered_ship import SteeredShip
+from kempf.flows.jobs.steering.steered_ship import SteeredShip
 from kempf.pipeline.model.chain import N_CHAIN
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES

@@ -22,13 +22,13 @@ ROOT = Path(__file__).parents[2]
 
 #: Jobs whose calls into the pipeline make the results of a stage.
 JOBS: dict[Stage, tuple[str, ...]] = {
-    "ingest": ("spool",),
-    "segment": ("search_log", "find_segments", "examine_log"),
+    "ingest": ("ingest/spool",),
+    "segment": ("ingest/search_log", "ingest/find_segments", "ingest/examine_log"),
     "estimate": (
-        *("identify_vessel", "pool_vessel", "no_speed_log", "parameter_set_of", "vessel_runs", "vessel_model"),
-        "update_model",
+        *("identify/identify_vessel", "identify/pool_vessel", "identify/no_speed_log", "identify/parameter_set_of"),
+        *("identify/vessel_runs", "identify/vessel_model", "identify/update_model"),
     ),
-    "diagnose": ("diagnose_vessel",),
+    "diagnose": ("diagnose/diagnose_vessel",),
 }
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kempf.flows.jobs.identify_vessel import identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.identify.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

@@ -197,7 +197,7 @@ def test_the_worst_fault_gives_the_exit_code(mariner: Ship, tmp_path: Path):
 
 
 def test_a_fault_of_our_own_on_one_log_stops_no_other(mariner: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from kempf.flows.jobs import ingest_logs
+    from kempf.flows.jobs.ingest import ingest_logs
 
     def read(name: str, log: Any, profile: Any) -> Any:
         if name.endswith("mcap"):

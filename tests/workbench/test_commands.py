@@ -237,7 +237,7 @@ def test_the_warehouse_may_be_named_by_the_environment(filled: Path, monkeypatch
 
 
 def test_the_demonstration_finds_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from kempf.flows.jobs import demonstrate
+    from kempf.flows.jobs.demo import demonstrate
 
     monkeypatch.setattr(demonstrate, "_DAYS", demonstrate._DAYS[1:2])  # one day is quicker than three
     human = kempf("demo", "--folder", tmp_path / "demo")

@@ -23,7 +23,7 @@ import pytest
 
 import kempf as kempf_package
 from kempf.flows.fleet import flows
-from kempf.flows.jobs.take_inbox import take_inbox
+from kempf.flows.jobs.inbox.take_inbox import take_inbox
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import delta, logs, parameter_sets, seals
 from kempf.warehouse.keys import earlier_key, vessel_key
@@ -213,7 +213,7 @@ def test_what_is_purged_after_is_gone_from_the_files_of_before_too(tmp_path: Pat
 #: it counts them.
 DYING = """
 import os, signal, sys
-from kempf.flows.jobs.migrate_warehouse import migrate
+from kempf.flows.jobs.repair.migrate_warehouse import migrate
 from kempf.warehouse import delta, seals
 from kempf.warehouse.migrations import by_month, by_name, commits
 from kempf.warehouse.store import Warehouse

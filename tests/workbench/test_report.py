@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnose.late_rudder import LAG_S
-from kempf.flows.jobs import diagnose_vessel
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.standing_model import Own
+from kempf.flows.jobs.diagnose import diagnose_vessel
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.standing_model import Own
 from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED
 from kempf.pipeline.diagnose.verdict import Verdict
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.reproduce_paper import ITERATIONS, Reproduction, reproduce_paper
+from kempf.flows.jobs.demo.reproduce_paper import ITERATIONS, Reproduction, reproduce_paper
 from kempf.workbench.cli.reproduce_paper import draw
 from tests.workbench.driving import HULL, kempf, refused
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from kempf.flows.jobs.correct_segments import plan_for
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.corrections.correct_segments import plan_for
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.warehouse import compaction, delta, history, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship

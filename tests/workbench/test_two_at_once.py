@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from kempf.flows.jobs import add_effect as job
+from kempf.flows.jobs.diagnose import add_effect as job
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet

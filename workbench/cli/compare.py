@@ -22,7 +22,7 @@ from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import print_json, print_note, print_table, progress_bar, short_ids
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.flows.jobs.compare.compare_vessel import Comparison
 
 #: probability below which a band or a correlation is shown
 _LEVEL = 0.01
@@ -75,8 +75,8 @@ def command(
     A manoeuvre that the set was identified from is fitted, every other held out. A free run takes no measurement
     in: its initial state and a constant wind force and current are fitted to the manoeuvre itself.
     """
-    from kempf.flows.jobs.compare_vessel import compare_vessel
-    from kempf.flows.jobs.out_of_date import said_of_vessel
+    from kempf.flows.jobs.compare.compare_vessel import compare_vessel
+    from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
 
     if fail_above is not None and not isfinite(fail_above):

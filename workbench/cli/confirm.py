@@ -12,7 +12,7 @@ from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import UsageError
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.affected_sets import Affected
+    from kempf.flows.jobs.corrections.affected_sets import Affected
 
 F = TypeVar("F", bound=Callable[..., Any])
 

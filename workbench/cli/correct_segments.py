@@ -15,7 +15,7 @@ from kempf.workbench.instants import utc_ns_of
 from kempf.workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.correct_segments import Planned
+    from kempf.flows.jobs.corrections.correct_segments import Planned
     from kempf.warehouse.segments import Segment
     from kempf.warehouse.store import Warehouse
 
@@ -32,7 +32,7 @@ def correct(
     segment_id: str, start: str | None, end: str | None, reason: str, yes: bool, uri: str, as_json: bool
 ) -> None:
     """Give a zigzag other bounds; executes and overshoots are measured again between them."""
-    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.flows.jobs.corrections.correct_segments import plan_for
     from kempf.warehouse import segments
     from kempf.warehouse.store import Warehouse
 
@@ -55,7 +55,7 @@ def correct(
 @json_option
 def exclude(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a manoeuvre count no longer: nothing is fitted to it, pooled with it or compared with it."""
-    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.flows.jobs.corrections.correct_segments import plan_for
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -70,7 +70,7 @@ def exclude(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) ->
 @json_option
 def accept(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a manoeuvre count as the search found it, or as it was added: undoes an exclusion and other bounds."""
-    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.flows.jobs.corrections.correct_segments import plan_for
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -87,7 +87,7 @@ def accept(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
 @json_option
 def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Add a zigzag that the search did not find, by its bounds in a log."""
-    from kempf.flows.jobs.correct_segments import plan_new
+    from kempf.flows.jobs.corrections.correct_segments import plan_new
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -150,7 +150,7 @@ COMMANDS = (correct, exclude, accept, add, list_corrections)
 
 def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bool) -> None:
     """Say what a correction changes, ask, and store it."""
-    from kempf.flows.jobs.out_of_date import command_for
+    from kempf.flows.jobs.state.out_of_date import command_for
 
     confirm(_words(planned), yes=yes)
     planned.store(warehouse)

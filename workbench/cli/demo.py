@@ -13,7 +13,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.demonstrate import Demonstration
+    from kempf.flows.jobs.demo.demonstrate import Demonstration
     from kempf.warehouse.parameter_set import ParameterSet
 
 
@@ -26,7 +26,7 @@ def command(folder: Path, as_json: bool) -> None:
     The logs are NMEA 0183, delimited text and MCAP with noise, wind, current and damaged lines; the pipeline gets
     nothing but the logs and the vessel's profile.
     """
-    from kempf.flows.jobs.demonstrate import demonstrate
+    from kempf.flows.jobs.demo.demonstrate import demonstrate
 
     with progress_bar() as progress:
         shown = demonstrate(folder, progress)

@@ -54,8 +54,8 @@ def command(
             raise click.UsageError("--set, --model and --effect-file need a --vessel; --fleet begins plain.")
         _fleet(uri, as_json=as_json)
         return
-    from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-    from kempf.flows.jobs.standing_model import Own
+    from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+    from kempf.flows.jobs.identify.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
 

@@ -29,8 +29,8 @@ def command(
     PATH is a raw log, read with the profile; or the id or file name of a log in the warehouse. Instruments that measure
     the same motion are compared: of three, the one that disagrees is named; of two, it is one of them.
     """
-    from kempf.flows.jobs.examine_log import examine_file, examine_held
-    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest.examine_log import examine_file, examine_held
+    from kempf.flows.jobs.ingest.files import read_profiles
     from kempf.schemas.profile import VesselProfile
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.new_file import require_figures, writing

@@ -32,8 +32,8 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
     Beside the vessel's current model; nothing is stored.
     """
-    from kempf.flows.jobs.out_of_date import said_of_vessel
-    from kempf.flows.jobs.try_formula import formula_of_ones_own, tried
+    from kempf.flows.jobs.diagnose.try_formula import formula_of_ones_own, tried
+    from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
 
     formula_of_ones_own(name, formula)
@@ -99,8 +99,8 @@ def add(
     An effect that makes predictions worse beyond their error is fitted and stored, but becomes the current model only
     with --force.
     """
-    from kempf.flows.jobs.add_effect import add_effect
-    from kempf.flows.jobs.standing_model import Own, rungs_to
+    from kempf.flows.jobs.diagnose.add_effect import add_effect
+    from kempf.flows.jobs.identify.standing_model import Own, rungs_to
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
@@ -175,7 +175,7 @@ def _scaled(value: float | None, factor: float) -> float | None:
 @json_option
 def undo(vessel: str, uri: str, as_json: bool) -> None:
     """Go back to the model before the last effect was added; nothing is deleted."""
-    from kempf.flows.jobs.standing_model import undo as go_back
+    from kempf.flows.jobs.identify.standing_model import undo as go_back
     from kempf.warehouse.store import Warehouse
 
     now = go_back(Warehouse(uri), vessel)

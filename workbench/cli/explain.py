@@ -27,7 +27,7 @@ def command(
     `kempf compare --where` names the stretches where a model fails most. This ranks on those instants alone; whether an
     effect is there, `kempf diagnose` decides on all manoeuvres.
     """
-    from kempf.flows.jobs.explain_stretch import explain_stretch
+    from kempf.flows.jobs.diagnose.explain_stretch import explain_stretch
     from kempf.warehouse.store import Warehouse
 
     begin, over = utc_ns_of(start, "--from"), utc_ns_of(end, "--to")

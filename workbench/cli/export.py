@@ -17,7 +17,7 @@ from kempf.workbench.cli.options import json_option, output_option, set_argument
 from kempf.workbench.terminal import print_json, print_note, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.flows.jobs.compare.compare_vessel import Comparison
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -137,9 +137,9 @@ def mcap_file(
     One step ahead with 95 % intervals, and the free run, with what each leaves, and the position; UTC nanoseconds, JSON
     messages with a schema, zstd.
     """
-    from kempf.flows.jobs.compare_vessel import compare_vessel
-    from kempf.flows.jobs.measured_positions import measured_positions
-    from kempf.flows.jobs.out_of_date import said_of_vessel
+    from kempf.flows.jobs.compare.compare_vessel import compare_vessel
+    from kempf.flows.jobs.compare.measured_positions import measured_positions
+    from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export_mcap import about, to_mcap
     from kempf.workbench.new_file import require_new, write_new
@@ -185,9 +185,9 @@ def _only(comparison: Comparison, beginnings: Sequence[str]) -> Comparison:
 
 
 def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | None, step: float, course: float) -> Any:
-    from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.flows.jobs.ship_model import ship_of_set
+    from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
+    from kempf.flows.jobs.steering.ship_model import ship_of_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import linear
 
@@ -198,8 +198,8 @@ def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | Non
 
 
 def _text(form: str, set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
-    from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.out_of_date import said_of_sets
+    from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
 

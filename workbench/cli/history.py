@@ -72,7 +72,7 @@ def command(
 
     Without --vessel, of the whole fleet.
     """
-    from kempf.flows.jobs.out_of_date import said_of_vessel
+    from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse import history, vessels
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.changes import changes_document, examined
@@ -201,7 +201,7 @@ def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> No
 
 def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:
     """Print what people noted of the vessels, by that time."""
-    from kempf.flows.jobs.notes_of_hers import notes_of_hers
+    from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
     from kempf.warehouse import notes
     from kempf.workbench.cli.note import words_of
 

@@ -19,7 +19,7 @@ from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import print_json, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
+    from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, Request
     from kempf.warehouse.parameter_set import ParameterSet
     from kempf.warehouse.store import Warehouse
 
@@ -49,9 +49,9 @@ def command(
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
-    from kempf.flows.jobs.default_model import default_model_of
-    from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-    from kempf.flows.jobs.standing_model import Own
+    from kempf.flows.jobs.identify.default_model import default_model_of
+    from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+    from kempf.flows.jobs.identify.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import named_model, read_effect_files
 
@@ -87,7 +87,7 @@ def _pooled(
 
     Where they share none the reason goes to stderr.
     """
-    from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
+    from kempf.flows.jobs.identify.pool_vessel import not_pooled, pool_vessel
 
     try:
         pooled = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
@@ -111,7 +111,7 @@ def _print_alone(alone: dict[str, str], *, verbose: bool) -> None:
 
 def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | None) -> None:
     """Say which set every command takes from now on, and why it is not the pooled one where it is not."""
-    from kempf.flows.jobs.chosen_set import chosen_set
+    from kempf.flows.jobs.identify.chosen_set import chosen_set
 
     try:
         current, _ = chosen_set(warehouse, vessel)

@@ -12,7 +12,7 @@ from kempf.workbench.cli.options import json_option, new_vessel_option, verbose_
 from kempf.workbench.terminal import one_line, print_json, print_note, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.take_inbox import InboxRun
+    from kempf.flows.jobs.inbox.take_inbox import InboxRun
 
 
 @click.command("inbox", cls=GivenOnce)
@@ -37,7 +37,7 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     into quarantine and stops no other; `kempf logs quarantine` lists them. Nothing in the inbox is moved or deleted.
     The exit code is 3 while something is in quarantine.
     """
-    from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
+    from kempf.flows.jobs.inbox.take_inbox import NeedsAPerson, take_inbox
     from kempf.flows.process.configuration import setting
     from kempf.schemas.errors import UsageError
     from kempf.warehouse.source_folder import SourceFolder

@@ -23,7 +23,7 @@ from kempf.workbench.ranked_warnings import of_several, show_warnings
 from kempf.workbench.terminal import one_line, print_json, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.ingest_logs import IngestOutcome
+    from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome
     from kempf.pipeline.ingest.readings import Tally
 
 
@@ -49,8 +49,8 @@ def command(
     Each log is read, checked, kept byte for byte and searched for manoeuvres. A log that is in already changes nothing.
     One that cannot be read stops none of the others, and leaves nothing behind.
     """
-    from kempf.flows.jobs.files import logs_in, read_profiles
-    from kempf.flows.jobs.ingest_logs import ingest
+    from kempf.flows.jobs.ingest.files import logs_in, read_profiles
+    from kempf.flows.jobs.ingest.ingest_logs import ingest
     from kempf.warehouse.store import Warehouse
 
     paths, beside = logs_in(paths)
@@ -96,7 +96,7 @@ def _print_outcome(outcome: IngestOutcome) -> None:
         label = click.style("removed before", fg="yellow")
         click.echo(f"  {label}: this log had been removed ({one_line(outcome.was_removed)}); now it counts again")
     if outcome.lost:
-        from kempf.flows.jobs.unreadable_stretches import as_json
+        from kempf.flows.jobs.ingest.unreadable_stretches import as_json
 
         times = [
             stretch["since"] or stretch["until"]

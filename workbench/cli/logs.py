@@ -42,7 +42,7 @@ def command() -> None:
 @json_option
 def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
-    from kempf.flows.jobs.out_of_date import said_of_logs
+    from kempf.flows.jobs.state.out_of_date import said_of_logs
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.logs import listed_logs
@@ -167,7 +167,7 @@ def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
 @json_option
 def quarantine(uri: str, as_json: bool) -> None:
     """List the files of inboxes that could not be placed or read, with the reason and what to do."""
-    from kempf.flows.jobs.take_inbox import quarantine_json
+    from kempf.flows.jobs.inbox.take_inbox import quarantine_json
     from kempf.warehouse import inbox
     from kempf.warehouse.store import Warehouse
 
@@ -200,8 +200,8 @@ def release_file(
     as_json: bool,
 ) -> None:
     """Ingest a file that is in quarantine, by its address or the end of it, as a log of the vessel that is named."""
-    from kempf.flows.jobs.files import read_profiles
-    from kempf.flows.jobs.release_log import release
+    from kempf.flows.jobs.inbox.release_log import release
+    from kempf.flows.jobs.ingest.files import read_profiles
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.cli.ingest import print_outcomes
 
@@ -220,7 +220,7 @@ def release_file(
 @json_option
 def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
     """Leave a file that is in quarantine alone for good. The file itself is not touched."""
-    from kempf.flows.jobs.release_log import dismiss
+    from kempf.flows.jobs.inbox.release_log import dismiss
     from kempf.warehouse.store import Warehouse
 
     row = dismiss(Warehouse(uri), file, reason)
@@ -238,9 +238,9 @@ def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
 @json_option
 def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a log count no longer. Nothing is deleted: `restore` brings it back, `history --as-of` still knows it."""
-    from kempf.flows.jobs.affected_sets import of_logs
-    from kempf.flows.jobs.out_of_date import command_for
-    from kempf.flows.jobs.remove_logs import remove
+    from kempf.flows.jobs.corrections.affected_sets import of_logs
+    from kempf.flows.jobs.corrections.remove_logs import remove
+    from kempf.flows.jobs.state.out_of_date import command_for
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
 
@@ -260,8 +260,8 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
 @json_option
 def restore_log(log_id: str, uri: str, as_json: bool) -> None:
     """Let a log that was removed count again, and its vessel where she was removed too."""
-    from kempf.flows.jobs.out_of_date import command_for
-    from kempf.flows.jobs.remove_logs import restore
+    from kempf.flows.jobs.corrections.remove_logs import restore
+    from kempf.flows.jobs.state.out_of_date import command_for
     from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.logs import facts_of
@@ -287,8 +287,8 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a log to the vessel that it is of: it is read again from its bytes, with her profile."""
-    from kempf.flows.jobs.affected_sets import of_logs
-    from kempf.flows.jobs.remove_logs import move
+    from kempf.flows.jobs.corrections.affected_sets import of_logs
+    from kempf.flows.jobs.corrections.remove_logs import move
     from kempf.schemas.errors import NotFound
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse

@@ -20,7 +20,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     Nothing is lost: what it says is compared before it counts. Interrupted, the same command goes on. Earlier versions
     of kempf refuse the warehouse from then on.
     """
-    from kempf.flows.jobs.migrate_warehouse import migrate, planned
+    from kempf.flows.jobs.repair.migrate_warehouse import migrate, planned
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)

@@ -22,7 +22,7 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     Where models fit alike, as `kempf diagnose` says, the zigzag that parts them; else the one that narrows the
     intervals of the parameters most. What it is worth is worked out by the set's model with the ship's own instruments.
     """
-    from kempf.flows.jobs.next_trial import next_trial
+    from kempf.flows.jobs.predict.next_trial import next_trial
     from kempf.warehouse.store import Warehouse
 
     with progress_bar() as progress:

@@ -42,8 +42,8 @@ def command(
     Notes are only ever added; `kempf history` shows them. Where a draught is noted for every log of a vessel, the
     effect load_condition goes by it.
     """
-    from kempf.flows.jobs.notes_of_hers import notes_of_hers
-    from kempf.flows.jobs.subject_of_note import subject_of
+    from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
+    from kempf.flows.jobs.corrections.subject_of_note import subject_of
     from kempf.warehouse import notes, vessels
     from kempf.warehouse.store import Warehouse
 

@@ -36,7 +36,7 @@ def command() -> None:
 @json_option
 def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     """List parameter sets, of one vessel or of all."""
-    from kempf.flows.jobs.out_of_date import said_of_vessel
+    from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.parameter_sets import listed_sets
 
@@ -61,9 +61,9 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 @json_option
 def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_json: bool) -> None:
     """Show a parameter set whole: an id, a unique beginning of one, an alias; default: current."""
-    from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.leg_fit import by_name
-    from kempf.flows.jobs.out_of_date import said_of_sets
+    from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.identify.leg_fit import by_name
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import print_parameter_set
 
@@ -105,8 +105,8 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     A parameter that only one of the sets has is shown with a dash for the other. Sets of two vessels are compared
     without dimension too, with K' = K L/V and T' = T V/L of their hulls.
     """
-    from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.out_of_date import said_of_sets
+    from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
     from kempf.workbench.parameter_set_table import print_by_likelihood
@@ -145,8 +145,8 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
 
     --json is short for --format json.
     """
-    from kempf.flows.jobs.chosen_set import named_set
-    from kempf.flows.jobs.out_of_date import said_of_sets
+    from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
     from kempf.workbench.new_file import write_new
@@ -172,7 +172,7 @@ def alias(name: str, set_id: str, vessel: str | None, uri: str, as_json: bool) -
 
     Every command that takes the id of a set takes the name as well. Names move, sets never change.
     """
-    from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.warehouse import aliases
     from kempf.warehouse.store import Warehouse
 
@@ -208,8 +208,8 @@ def steering(
     Of a set with effects these are the constants of its linear model about a straight course; what has no part in it is
     named, and so is a lag of the rudder, which is none of the hull's.
     """
-    from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.flows.jobs.steering_of_set import steering_of_set
+    from kempf.flows.jobs.state.out_of_date import said_of_sets
+    from kempf.flows.jobs.steering.steering_of_set import steering_of_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.ranked_warnings import show_warnings
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from kempf.flows.jobs.predict_request import Kind, PredictRequest, angles_of
+from kempf.flows.jobs.predict.predict_request import Kind, PredictRequest, angles_of
 from kempf.schemas.enumeration import as_words, counted
 from kempf.schemas.errors import UsageError
 from kempf.schemas.side import Side
@@ -20,8 +20,8 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre
-    from kempf.flows.jobs.predicted import Predicted
+    from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre
+    from kempf.flows.jobs.predict.predicted import Predicted
     from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
@@ -71,8 +71,8 @@ def command(
     The intervals are those of ships that the errors of the set allow, of it and of every model that fits the
     data as well. What is beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
-    from kempf.flows.jobs.checked_prediction import predict_checked
-    from kempf.flows.jobs.compare_predicted import measured_beside, measured_kind, other_orders
+    from kempf.flows.jobs.predict.checked_prediction import predict_checked
+    from kempf.flows.jobs.predict.compare_predicted import measured_beside, measured_kind, other_orders
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.prediction import prediction_document
 
@@ -183,7 +183,7 @@ def _print_models(predicted: Predicted) -> None:
 
 
 def _print_measured(measured: Sequence[MeasuredManoeuvre], kind: str) -> None:
-    from kempf.flows.jobs.one_sided import one_sided
+    from kempf.flows.jobs.predict.one_sided import one_sided
     from kempf.workbench.documents.prediction import judged, sentence_of
 
     if not measured:

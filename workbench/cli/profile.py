@@ -25,7 +25,7 @@ def draft(log: Path, output: Path | None, as_json: bool) -> None:
 
     Look at every line that has a ?, correct it and delete the ?; a profile with one left is refused.
     """
-    from kempf.flows.jobs.draft_profile import draft as drafted
+    from kempf.flows.jobs.ingest.draft_profile import draft as drafted
     from kempf.workbench.new_file import write_new
 
     text = drafted(log)

@@ -23,8 +23,8 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     What was concluded from it stays and counts no longer: its manoeuvres, parameter sets, diagnoses. The receipt is
     kept, and the log is not taken in again. For what was only a mistake there is `kempf logs remove`.
     """
-    from kempf.flows.jobs.out_of_date import command_for
-    from kempf.flows.jobs.purge_logs import is_done, purge, what_goes
+    from kempf.flows.jobs.corrections.purge_logs import is_done, purge, what_goes
+    from kempf.flows.jobs.state.out_of_date import command_for
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)

@@ -24,7 +24,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     Damaged files are kept aside in the folder `damaged` of the warehouse. Leaves with exit code 3 where something is
     still wrong.
     """
-    from kempf.flows.jobs.repair_warehouse import repair
+    from kempf.flows.jobs.repair.repair_warehouse import repair
     from kempf.warehouse.migrations.chain import MARKER_MENDED, repair_marker
     from kempf.warehouse.store import Warehouse
     from kempf.warehouse.verify import verify

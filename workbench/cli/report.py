@@ -31,7 +31,7 @@ def command(
     The file asks for nothing outside itself and can be sent as it is. A diagnosis that `kempf diagnose` stored is read;
     one that is not stored is made first, and stored.
     """
-    from kempf.flows.jobs.standing_model import Own
+    from kempf.flows.jobs.identify.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
     from kempf.workbench.new_file import require_new, write_new

@@ -40,7 +40,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
     a single one that is named is.
     """
     from kempf.flows.fleet.report import beyond, findings_in_words
-    from kempf.flows.jobs.files import read_quality
+    from kempf.flows.jobs.ingest.files import read_quality
     from kempf.schemas.quality import NO_LIMITS
     from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
@@ -53,7 +53,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
         vessels.require(warehouse, name)
     reports: list[dict[str, Any]]
     if len(names) == 1:
-        from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+        from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 
         with progress_bar() as progress:
             reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).as_json()]

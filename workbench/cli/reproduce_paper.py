@@ -14,7 +14,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
+    from kempf.flows.jobs.demo.reproduce_paper import Experiment, Reproduction
 
 
 @click.command("reproduce-paper", cls=GivenOnce)
@@ -26,7 +26,7 @@ def command(folder: Path, as_json: bool) -> None:
     A zigzag is simulated under a constant wind force and current; the hull is identified by the paper's 25 iterations
     and by maximum likelihood from the same record, once with little noise and once with that of usual instruments.
     """
-    from kempf.flows.jobs.reproduce_paper import reproduce_paper
+    from kempf.flows.jobs.demo.reproduce_paper import reproduce_paper
 
     try:
         folder.mkdir(parents=True, exist_ok=True)

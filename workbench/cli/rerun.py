@@ -14,8 +14,8 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.rerun_all import Verification
-    from kempf.flows.jobs.rerun_set import Rerun
+    from kempf.flows.jobs.reprocess.rerun_all import Verification
+    from kempf.flows.jobs.reprocess.rerun_set import Rerun
     from kempf.warehouse.store import Warehouse
 
 
@@ -60,7 +60,7 @@ def command(
     Exit code 5 where one is different, 3 where one of --all cannot be built again. Interrupted, --all goes on where it
     stopped when it is called again.
     """
-    from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.warehouse.store import Warehouse
 
     if unadopt:
@@ -94,7 +94,7 @@ def command(
 
 
 def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) -> None:
-    from kempf.flows.jobs.rerun_set import rerun
+    from kempf.flows.jobs.reprocess.rerun_set import rerun
 
     with progress_bar() as progress:
         result = rerun(warehouse, set_id, tolerance, progress)
@@ -120,7 +120,7 @@ def _print_rerun(result: Rerun) -> None:
 
 
 def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afresh: bool, as_json: bool) -> None:
-    from kempf.flows.jobs.rerun_all import verify_all
+    from kempf.flows.jobs.reprocess.rerun_all import verify_all
 
     with progress_bar() as progress:
         verification = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=progress)

@@ -15,8 +15,8 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.parameter_changes import Move
-    from kempf.flows.jobs.preview_code import VesselPreview
+    from kempf.flows.jobs.reprocess.parameter_changes import Move
+    from kempf.flows.jobs.reprocess.preview_code import VesselPreview
     from kempf.warehouse.equivalents import Equivalent
     from kempf.warehouse.store import Warehouse
 
@@ -29,7 +29,7 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
 
     With ``adopt`` the present code then counts as the one before; where something moves that is refused.
     """
-    from kempf.flows.jobs.preview_code import preview_all
+    from kempf.flows.jobs.reprocess.preview_code import preview_all
 
     with progress_bar() as progress:
         previews = preview_all(warehouse, vessels, progress)
@@ -58,7 +58,7 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
 
 
 def _adopted(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[Equivalent]:
-    from kempf.flows.jobs.adopt_code import adopt_code
+    from kempf.flows.jobs.reprocess.adopt_code import adopt_code
 
     return adopt_code(warehouse, previews)
 

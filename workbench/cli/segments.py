@@ -48,7 +48,7 @@ for _one in correct_segments.COMMANDS:
 
 
 def _list(vessel: str | None, uri: str, as_json: bool) -> None:
-    from kempf.flows.jobs.out_of_date import said_of_logs
+    from kempf.flows.jobs.state.out_of_date import said_of_logs
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 

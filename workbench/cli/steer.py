@@ -16,7 +16,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.steer_vessel import Steered, Tried
+    from kempf.flows.jobs.steering.steer_vessel import Steered, Tried
 
 
 @click.command("steer", cls=GivenOnce)
@@ -56,7 +56,7 @@ def command(
     parameters cost. It does not show that the parameters are right. Law and ship have the effects of the set, as far as
     a linear law and the simulator can; the warnings name the rest.
     """
-    from kempf.flows.jobs.steer_vessel import SteerRequest, steer_vessel
+    from kempf.flows.jobs.steering.steer_vessel import SteerRequest, steer_vessel
     from kempf.pipeline.steering.course_keeping import LawSettings
     from kempf.warehouse.store import Warehouse
 

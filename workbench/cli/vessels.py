@@ -69,7 +69,7 @@ def show(name: str, uri: str, as_json: bool) -> None:
 @json_option
 def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
     """Replace the vessel's current profile by another; `kempf reprocess` then applies it to her logs."""
-    from kempf.flows.jobs.register_vessel import set_vessel
+    from kempf.flows.jobs.ingest.register_vessel import set_vessel
     from kempf.warehouse.store import Warehouse
 
     changed = set_vessel(Warehouse(uri), name, profiles)
@@ -87,8 +87,8 @@ def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) 
 @json_option
 def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a vessel and all her logs count no longer. Nothing is deleted; `kempf history --as-of` still knows them."""
-    from kempf.flows.jobs.affected_sets import of_logs
-    from kempf.flows.jobs.remove_logs import remove_vessel
+    from kempf.flows.jobs.corrections.affected_sets import of_logs
+    from kempf.flows.jobs.corrections.remove_logs import remove_vessel
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
 
@@ -128,9 +128,9 @@ def _stays(warehouse: Warehouse, name: str) -> str:
 @json_option
 def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a vessel another name: her logs are read for it again, her models are identified again by `reprocess`."""
-    from kempf.flows.jobs.affected_sets import of_logs
-    from kempf.flows.jobs.out_of_date import command_for
-    from kempf.flows.jobs.remove_logs import rename_vessel
+    from kempf.flows.jobs.corrections.affected_sets import of_logs
+    from kempf.flows.jobs.corrections.remove_logs import rename_vessel
+    from kempf.flows.jobs.state.out_of_date import command_for
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.standing_model import current_id, rungs_to, standing
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.standing_model import current_id, rungs_to, standing
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.store import Warehouse

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
+from kempf.flows.jobs.ingest.unreadable_stretches import as_json as lost_as_json
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.instants import iso_utc
 from kempf.warehouse import examinations, logs, lost, vessels

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.flows.jobs.vessel_quality import marks
+from kempf.flows.jobs.reprocess.vessel_quality import marks
 from kempf.warehouse import examinations, logs, segments
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from statistics import median
 from typing import Any
 
-from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
-from kempf.flows.jobs.one_sided import OneSided, one_sided
-from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.jobs.predict.compare_predicted import MeasuredManoeuvre
+from kempf.flows.jobs.predict.one_sided import OneSided, one_sided
+from kempf.flows.jobs.predict.predicted import Predicted
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.workbench.manoeuvre_figures import in_words, scaled
 

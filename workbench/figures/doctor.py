@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.flows.jobs.examine_log import ExaminedLog
+from kempf.flows.jobs.ingest.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import CheckFigure
 from kempf.pipeline.channels.series import Float, Nanoseconds

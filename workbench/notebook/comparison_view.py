@@ -11,7 +11,7 @@ import polars as pl
 from kempf.workbench.notebook.frames import as_html, with_instants
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.flows.jobs.compare.compare_vessel import Comparison
 
 
 @dataclass(frozen=True, eq=False)

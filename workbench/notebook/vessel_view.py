@@ -72,10 +72,10 @@ class VesselView:
         KempfError
             No zigzag could be identified from, or there is none.
         """
-        from kempf.flows.jobs.default_model import default_model_of
-        from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-        from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
-        from kempf.flows.jobs.standing_model import Own
+        from kempf.flows.jobs.identify.default_model import default_model_of
+        from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+        from kempf.flows.jobs.identify.pool_vessel import not_pooled, pool_vessel
+        from kempf.flows.jobs.identify.standing_model import Own
         from kempf.workbench.chosen_model import named_model
 
         name = None if model is None else os.fspath(model)
@@ -119,9 +119,9 @@ class VesselView:
         Raises
         ------
         KempfError
-            See `kempf.flows.jobs.compare_vessel.compare_vessel`.
+            See `kempf.flows.jobs.compare.compare_vessel.compare_vessel`.
         """
-        from kempf.flows.jobs.compare_vessel import compare_vessel
+        from kempf.flows.jobs.compare.compare_vessel import compare_vessel
 
         return ComparisonView(compare_vessel(self.warehouse, self.name, set_id, horizon))
 
@@ -157,28 +157,28 @@ class VesselView:
 
     def diagnose(self) -> DiagnosisView:
         """Find which physical effect the plain model of eq. (16) lacks, and say how sure that is."""
-        from kempf.flows.jobs.default_model import default_model_of
-        from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+        from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+        from kempf.flows.jobs.identify.default_model import default_model_of
 
         return DiagnosisView(diagnose_vessel(self.warehouse, self.name, default_model_of(self.warehouse, self.name))[0])
 
     def add_effect(self, name: str) -> pl.DataFrame:
         """Add an effect of the catalogue to her model and refit; return the ladder from the plain model to this one."""
-        from kempf.flows.jobs.add_effect import add_effect
+        from kempf.flows.jobs.diagnose.add_effect import add_effect
 
         add_effect(self.warehouse, self.name, name)
         return self.ladder()
 
     def undo_effect(self) -> pl.DataFrame:
         """Go back to the model before the last effect was added; nothing is deleted. Return the ladder to it."""
-        from kempf.flows.jobs.standing_model import undo
+        from kempf.flows.jobs.identify.standing_model import undo
 
         undo(self.warehouse, self.name)
         return self.ladder()
 
     def ladder(self) -> pl.DataFrame:
         """Return the models that lead to hers, one row each, with their free-run errors; no row where she has none."""
-        from kempf.flows.jobs.standing_model import rungs_to, standing
+        from kempf.flows.jobs.identify.standing_model import rungs_to, standing
 
         model = standing(self.warehouse, self.name)
         return ladder_frame([] if model is None else rungs_to(self.warehouse, model))

@@ -79,8 +79,8 @@ class WarehouseView:
         KempfError
             Where no log could be read, the error of the first.
         """
-        from kempf.flows.jobs.files import read_profiles
-        from kempf.flows.jobs.ingest_logs import ingest
+        from kempf.flows.jobs.ingest.files import read_profiles
+        from kempf.flows.jobs.ingest.ingest_logs import ingest
 
         files = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
         profiles = None if profile is None else read_profiles([Path(profile)])

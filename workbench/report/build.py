@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from math import nan
 from typing import Any
 
-from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose_refreshed
-from kempf.flows.jobs.parameter_set_of import channel_warnings
-from kempf.flows.jobs.standing_model import Own, standing
-from kempf.flows.jobs.stored_diagnosis import diagnosed_with_evidence
+from kempf.flows.jobs.diagnose.stored_diagnosis import diagnosed_with_evidence
+from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose_refreshed
+from kempf.flows.jobs.identify.parameter_set_of import channel_warnings
+from kempf.flows.jobs.identify.standing_model import Own, standing
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter
 from kempf.schemas.instants import iso_utc, minute

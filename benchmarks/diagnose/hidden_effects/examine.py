@@ -15,9 +15,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse

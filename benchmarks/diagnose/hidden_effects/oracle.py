@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.identify.chosen_manoeuvres import choose
+from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.predict.free_run import free_run

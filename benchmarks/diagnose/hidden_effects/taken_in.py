@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.ingest.files import read_profiles
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.warehouse.store import Warehouse
 
 

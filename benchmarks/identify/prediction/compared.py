@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.flows.jobs.checked_prediction import CheckedPredictions
-from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predict.checked_prediction import CheckedPredictions
+from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 from kempf.pipeline.segment.turning_figures import turning_figures

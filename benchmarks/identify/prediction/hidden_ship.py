@@ -23,9 +23,9 @@ from benchmarks.diagnose.hidden_effects.write import logs_of
 from benchmarks.identify.prediction.calm_water import sailed, truth_of
 from benchmarks.identify.prediction.compared import RUDDERS_DEG, ComparedShip, Truth, predicted_beside
 from benchmarks.identify.prediction.plain_ship import slides
-from kempf.flows.jobs.add_effect import add_effect
-from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.diagnose.add_effect import add_effect
+from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.hulls import HULLS, SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream

@@ -26,9 +26,9 @@ from benchmarks.identify.prediction.compared import (
     predicted_beside,
     zigzag,
 )
-from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.identify.pool_vessel import pool_vessel
+from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull

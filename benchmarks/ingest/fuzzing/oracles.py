@@ -16,7 +16,7 @@ from time import perf_counter, process_time
 
 from benchmarks.ingest.fuzzing.corpus import PROFILE, Reader, inputs
 from benchmarks.ingest.fuzzing.whole_chunks import vouched_times
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings
 from kempf.schemas.channels import CHANNEL_COLUMNS
 from kempf.schemas.errors import KempfError

@@ -11,8 +11,8 @@ from shutil import copytree
 import pytest
 from starlette.testclient import TestClient
 
-from kempf.flows.jobs import standing_model
-from kempf.flows.jobs.correct_segments import plan_for
+from kempf.flows.jobs.corrections.correct_segments import plan_for
+from kempf.flows.jobs.identify import standing_model
 from kempf.flows.process.progress import silent
 from kempf.warehouse import aliases, segments
 from kempf.warehouse.store import Warehouse

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from kempf.flows.jobs.standing_model import Own
+from kempf.flows.jobs.identify.standing_model import Own
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.report.build import make_report

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from threading import Lock
 
-from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.warehouse.store import Warehouse
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.leg_fit import by_name, shown_by_legs
-from kempf.flows.jobs.vessel_state import VesselState, fleet_state, responsible_code
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.leg_fit import by_name, shown_by_legs
+from kempf.flows.jobs.state.vessel_state import VesselState, fleet_state, responsible_code
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
@@ -22,7 +22,7 @@ from kempf.warehouse.store import Warehouse
 from kempf.warehouse.whole_file import keep_newest, whole_file
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.flows.jobs.compare.compare_vessel import Comparison
 
 #: Horizons that the pages offer: as asked for, and in words.
 HORIZONS = (

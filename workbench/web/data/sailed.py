@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, cast, get_args
 
-from kempf.flows.jobs.predict_request import Kind, PredictRequest, angles_of, required
+from kempf.flows.jobs.predict.predict_request import Kind, PredictRequest, angles_of, required
 from kempf.schemas.errors import UsageError
 from kempf.schemas.side import Side
 from kempf.workbench.web.form_numbers import number_of
@@ -33,7 +33,7 @@ def request_of(fields: Mapping[str, Any]) -> PredictRequest:
     ------
     UsageError
         ``manoeuvre_unknown``, ``side_unknown``, ``number_unreadable``, ``angles_unreadable``; and what
-        `kempf.flows.jobs.predict_request.required` raises.
+        `kempf.flows.jobs.predict.predict_request.required` raises.
     """
     kind, side = fields["manoeuvre"] or MANOEUVRES[0], fields["side"] or SIDES[0]
     if kind not in MANOEUVRES:

@@ -18,7 +18,7 @@ def draw_what_if(series: Mapping[str, Any]) -> Markup:
     Parameters
     ----------
     series : mapping
-        See `kempf.flows.jobs.what_if.series_of`.
+        See `kempf.flows.jobs.compare.what_if.series_of`.
     """
     measured = _columns(series["measured"])
     time = measured.pop("time_s")

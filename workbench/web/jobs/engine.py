@@ -23,7 +23,10 @@ from kempf.workbench.web.jobs.queue import RUNNING, Job, Queue
 
 _PAUSE_S = 0.1
 #: what a fit needs, and takes seconds to load
-_HEAVY = ("compare_vessel", "diagnose_vessel", "vessel_model", "reprocess_vessel", "checked_prediction")
+_HEAVY = (
+    *("identify.vessel_model", "compare.compare_vessel", "diagnose.diagnose_vessel"),
+    *("predict.checked_prediction", "reprocess.reprocess_vessel"),
+)
 
 
 def run(state: Path, warehouse: Warehouse) -> None:

@@ -23,7 +23,7 @@ from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.correct_segments import Planned
+    from kempf.flows.jobs.corrections.correct_segments import Planned
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,9 @@ def _keep_predictions(
     warehouse: Warehouse, state: Path, vessel: str, name: str, progress: Progress, asked: str | None = None
 ) -> None:
     """Keep what a set predicts at every horizon; one that is too long for the runs is left out, unless asked for."""
-    from kempf.flows.jobs.bound_runs import bound
-    from kempf.flows.jobs.compare_vessel import compared
-    from kempf.flows.jobs.vessel_state import fleet_state
+    from kempf.flows.jobs.compare.bound_runs import bound
+    from kempf.flows.jobs.compare.compare_vessel import compared
+    from kempf.flows.jobs.state.vessel_state import fleet_state
     from kempf.pipeline.predict.horizon import horizon_of
     from kempf.workbench.web.data.predictions import HORIZONS, keep, key_of
 
@@ -69,7 +69,7 @@ def _keep_predictions(
 
 def _keep_those_of_current(warehouse: Warehouse, state: Path, vessel: str, progress: Progress) -> None:
     """Keep what a vessel's current set predicts, so that the page of her model need not wait."""
-    from kempf.flows.jobs.standing_model import current_id
+    from kempf.flows.jobs.identify.standing_model import current_id
 
     _keep_those_of(warehouse, state, vessel, current_id(warehouse, vessel), progress)
 
@@ -86,8 +86,8 @@ def _keep_those_of(warehouse: Warehouse, state: Path, vessel: str, name: str | N
 
 def diagnose(work: Work) -> dict[str, Any]:
     """Find which physical effect a vessel's model lacks."""
-    from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-    from kempf.flows.jobs.standing_model import standing_model
+    from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+    from kempf.flows.jobs.identify.standing_model import standing_model
 
     spec, own = standing_model(work.warehouse, work.arguments["vessel"])
     diagnosis, _ = diagnose_vessel(work.warehouse, work.arguments["vessel"], spec, own, progress=work.progress)
@@ -116,9 +116,9 @@ def report(work: Work) -> dict[str, Any]:
 
 def add(work: Work) -> dict[str, Any]:
     """Add an effect to a vessel's current model."""
-    from kempf.flows.jobs.add_effect import add_effect
-    from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
-    from kempf.flows.jobs.try_formula import formula_of_ones_own
+    from kempf.flows.jobs.diagnose.add_effect import add_effect
+    from kempf.flows.jobs.diagnose.try_formula import formula_of_ones_own
+    from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
 
     name, formula = work.arguments["effect"], work.arguments["formula"]
     own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
@@ -138,7 +138,7 @@ def add(work: Work) -> dict[str, Any]:
 
 def undo(work: Work) -> dict[str, Any]:
     """Make the model before a vessel's current one the current one again."""
-    from kempf.flows.jobs import standing_model
+    from kempf.flows.jobs.identify import standing_model
 
     before = standing_model.undo(work.warehouse, work.arguments["vessel"], work.arguments["standing"] or None)
     return {"to": f"{of_vessel(work.arguments['vessel'])}/ladder", "parameter_set_id": before.parameter_set_id}
@@ -146,7 +146,7 @@ def undo(work: Work) -> dict[str, Any]:
 
 def reprocess(work: Work) -> dict[str, Any]:
     """Bring a vessel up to date with her profile, her logs and the code."""
-    from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+    from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 
     report = reprocess_vessel(work.warehouse, work.arguments["vessel"], progress=work.progress)
     _keep_those_of_current(work.warehouse, work.state, work.arguments["vessel"], work.progress)
@@ -155,8 +155,8 @@ def reprocess(work: Work) -> dict[str, Any]:
 
 def ingest(work: Work) -> dict[str, Any]:
     """Take the logs in that a browser sent; the result is what `kempf ingest --json` prints of each."""
-    from kempf.flows.jobs.files import read_profiles
-    from kempf.flows.jobs.ingest_logs import ingest as take_in
+    from kempf.flows.jobs.ingest.files import read_profiles
+    from kempf.flows.jobs.ingest.ingest_logs import ingest as take_in
 
     paths = paths_of(work.state, work.arguments["files"])
     profiles = read_profiles(paths_of(work.state, work.arguments["profile"])) if work.arguments["profile"] else None
@@ -171,7 +171,7 @@ def ingest(work: Work) -> dict[str, Any]:
 def _with_draft(error: KempfError, log: Path, vessel: str) -> KempfError:
     """Return the error of a log that needs a profile with the draft of one, for a person to correct."""
     if error.code == "no_source_for_log":
-        from kempf.flows.jobs.draft_profile import draft
+        from kempf.flows.jobs.ingest.draft_profile import draft
 
         with suppress(KempfError):
             # a JSON text is a YAML one
@@ -194,7 +194,7 @@ def correct(work: Work) -> dict[str, Any]:
 
 
 def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
-    from kempf.flows.jobs.correct_segments import plan_for, plan_new
+    from kempf.flows.jobs.corrections.correct_segments import plan_for, plan_new
 
     ends = arguments["bounds_utc_ns"]
     bounds = (int(ends[0]), int(ends[1])) if ends else None
@@ -205,8 +205,8 @@ def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
 
 def predict_manoeuvre(work: Work) -> dict[str, Any]:
     """Predict a standard manoeuvre; the result is what `kempf predict --compare --json` prints, with what is drawn."""
-    from kempf.flows.jobs.checked_prediction import predict_checked
-    from kempf.flows.jobs.compare_predicted import measured_beside, other_orders
+    from kempf.flows.jobs.predict.checked_prediction import predict_checked
+    from kempf.flows.jobs.predict.compare_predicted import measured_beside, other_orders
     from kempf.workbench.documents.prediction import prediction_document
     from kempf.workbench.web.data.sailed import curves_of, request_of
 
@@ -220,7 +220,7 @@ def predict_manoeuvre(work: Work) -> dict[str, Any]:
 
 def try_formula(work: Work) -> dict[str, Any]:
     """Try an effect of one's own; the result is what `kempf effects try --json` prints."""
-    from kempf.flows.jobs.try_formula import tried
+    from kempf.flows.jobs.diagnose.try_formula import tried
 
     vessel, formula, name = (work.arguments[field] for field in ("vessel", "formula", "name"))
     return {"document": tried(work.warehouse, vessel, formula, name, work.progress)}
@@ -228,7 +228,7 @@ def try_formula(work: Work) -> dict[str, Any]:
 
 def what_if(work: Work) -> dict[str, Any]:
     """Move one parameter of a set; the result is what `kempf what-if --json` prints, with what is drawn."""
-    from kempf.flows.jobs import what_if as job
+    from kempf.flows.jobs.compare import what_if as job
 
     vessel, fields = work.arguments["vessel"], {name: work.arguments[name] for name in ("parameter", "set", "segment")}
     segment_id = fields["segment"] or None
@@ -239,7 +239,7 @@ def what_if(work: Work) -> dict[str, Any]:
 
 def explain(work: Work) -> dict[str, Any]:
     """Score every effect on a stretch of a manoeuvre; the result is what `kempf explain --json` prints."""
-    from kempf.flows.jobs.explain_stretch import explain_stretch
+    from kempf.flows.jobs.diagnose.explain_stretch import explain_stretch
 
     vessel, (begin, end) = work.arguments["vessel"], work.arguments["window_utc_ns"]
     named = work.arguments["segment"]
@@ -250,7 +250,7 @@ def explain(work: Work) -> dict[str, Any]:
 
 def next_trial(work: Work) -> dict[str, Any]:
     """Find the zigzag to sail next; the result is what `kempf next-trial --json` prints."""
-    from kempf.flows.jobs import next_trial as job
+    from kempf.flows.jobs.predict import next_trial as job
 
     vessel, fields = work.arguments["vessel"], {name: work.arguments[name] for name in ("set", "parameter")}
     trial = job.next_trial(work.warehouse, vessel, fields["set"], fields["parameter"] or None, work.progress)

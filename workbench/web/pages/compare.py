@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kempf.flows.jobs.chosen_set import named_set
-from kempf.flows.jobs.leg_fit import by_name
-from kempf.flows.jobs.out_of_date import said_of_sets
-from kempf.flows.jobs.vessel_state import fleet_state
+from kempf.flows.jobs.identify.chosen_set import named_set
+from kempf.flows.jobs.identify.leg_fit import by_name
+from kempf.flows.jobs.state.out_of_date import said_of_sets
+from kempf.flows.jobs.state.vessel_state import fleet_state
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.documents.compared_sets import compared_sets

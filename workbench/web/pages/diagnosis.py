@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.standing_model import current_effects
+from kempf.flows.jobs.identify.standing_model import current_effects
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import aliases, diagnoses
 from kempf.workbench.rungs import first_model

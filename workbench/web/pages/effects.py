@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.standing_model import current_effects
+from kempf.flows.jobs.identify.standing_model import current_effects
 from kempf.schemas.effects import catalogue, get
 from kempf.warehouse import diagnoses
 from kempf.workbench.web.app_state import AppState

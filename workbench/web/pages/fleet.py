@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from kempf.flows.jobs.vessel_report import FLOW
+from kempf.flows.jobs.reprocess.vessel_report import FLOW
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.quality import in_words
 from kempf.warehouse import diagnoses, inbox, runs, views

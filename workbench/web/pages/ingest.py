@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from kempf.flows.jobs.ingest_logs import settle_vessel
-from kempf.flows.jobs.vessel_state import fleet_state
+from kempf.flows.jobs.ingest.ingest_logs import settle_vessel
+from kempf.flows.jobs.state.vessel_state import fleet_state
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import vessels
 from kempf.workbench.web.app_state import AppState
@@ -51,7 +51,7 @@ def ask_with_profile(app_state: AppState, failed: Job, text: str) -> Job:
 
 
 def _queued(app_state: AppState, files: list[str], profile: list[str], vessel: str | None, new: str) -> Job:
-    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest.files import read_profiles
 
     profiles = read_profiles(paths_of(app_state.folder, profile)) if profile else None
     # a slip of the hand in the name is said at once

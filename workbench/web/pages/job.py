@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from itertools import groupby
 from typing import Any, get_args
 
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.standing_model import require_current
-from kempf.flows.jobs.vessel_state import fleet_state
+from kempf.flows.jobs.identify.chosen_set import chosen_set
+from kempf.flows.jobs.identify.standing_model import require_current
+from kempf.flows.jobs.state.vessel_state import fleet_state
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.correction import Action
 from kempf.schemas.effects import get
@@ -136,7 +136,7 @@ def _known_set(app_state: AppState, arguments: Arguments) -> None:
 
 
 def _formula(app_state: AppState, arguments: Arguments) -> None:
-    from kempf.flows.jobs.try_formula import formula_of_ones_own
+    from kempf.flows.jobs.diagnose.try_formula import formula_of_ones_own
 
     arguments["name"] = arguments["name"].strip() or "own"
     formula_of_ones_own(arguments["name"], arguments["formula"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.out_of_date import said_of_vessel
+from kempf.flows.jobs.state.out_of_date import said_of_vessel
 from kempf.workbench.documents.ladder import ladder_document
 from kempf.workbench.rungs import compared, remarks
 from kempf.workbench.web.addresses import of_vessel

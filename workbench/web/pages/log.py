@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.notes_of_hers import notes_of_hers
-from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
+from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
+from kempf.flows.jobs.ingest.unreadable_stretches import as_json as lost_as_json
 from kempf.schemas.instants import iso_utc
 from kempf.warehouse import logs, lost, segments
 from kempf.workbench.documents.logs import log_document

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kempf.flows.jobs.notes_of_hers import notes_of_hers
+from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.instants import iso_utc, minute
 from kempf.warehouse import aliases, logs, lost, segments

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kempf.flows.jobs.out_of_date import said_of_vessel
+from kempf.flows.jobs.state.out_of_date import said_of_vessel
 from kempf.pipeline.compare.evidence import SAMPLES, Evidence, evidence_in
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import NotFound

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from kempf.flows.jobs.subject_of_note import subject_of
+from kempf.flows.jobs.corrections.subject_of_note import subject_of
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import notes
 from kempf.workbench.web.addresses import of_vessel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from kempf.flows.jobs.out_of_date import said_of_vessel
+from kempf.flows.jobs.state.out_of_date import said_of_vessel
 from kempf.workbench.manoeuvre_figures import FIGURES, LAST_TURN, beside_in_words, in_words
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

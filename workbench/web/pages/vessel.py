@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.flows.jobs.notes_of_hers import notes_of_hers
-from kempf.flows.jobs.out_of_date import said_of_vessel
-from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS
+from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
+from kempf.flows.jobs.identify.standing_model import POOLED, WITH_EFFECTS
+from kempf.flows.jobs.state.out_of_date import said_of_vessel
 from kempf.warehouse import aliases, diagnoses, history
 from kempf.workbench.documents.logs import listed_logs
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike

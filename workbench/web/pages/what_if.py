@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.identify.chosen_set import chosen_set
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

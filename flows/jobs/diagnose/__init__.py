@@ -1,0 +1,1 @@
+"""What a model lacks, and the effects that are added to it."""

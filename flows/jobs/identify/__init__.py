@@ -1,0 +1,1 @@
+"""From manoeuvres to parameter sets."""

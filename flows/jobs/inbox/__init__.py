@@ -1,0 +1,1 @@
+"""A folder or bucket into which logs are delivered, and its quarantine."""

@@ -1,0 +1,1 @@
+"""Standard manoeuvres from a parameter set, beside those that were measured."""

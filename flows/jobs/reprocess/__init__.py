@@ -1,0 +1,1 @@
+"""Vessels brought up to date, and stored sets made again."""

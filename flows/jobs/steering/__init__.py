@@ -1,0 +1,1 @@
+"""Course keeping from a parameter set."""
