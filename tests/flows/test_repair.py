@@ -337,7 +337,7 @@ def test_a_repair_that_was_cut_off_is_finished_by_the_next(
     for path in files(warehouse, "segments"):
         flipped(path)
     with monkeypatch.context() as patched:
-        patched.setattr("kempf.flows.jobs.repair.repair_warehouse._profiles", cut_off)
+        patched.setattr("kempf.flows.jobs.repair.repair_warehouse.register_profiles", cut_off)
         with pytest.raises(KeyboardInterrupt):
             repair(warehouse)
     assert [one.where for one in verify(warehouse)] == ["damaged/unfinished.json"]
