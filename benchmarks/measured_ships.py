@@ -14,7 +14,7 @@ from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
 from kempf.schemas.errors import KempfError, NotFound
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
 

@@ -10,8 +10,8 @@ from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, Own, mode
 from kempf.flows.jobs.ingest.files import read_model
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases
 
 _LARGEST = 100_000
 

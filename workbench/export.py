@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.steering.ship_model import ShipOfSet

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kempf.schemas.errors import UsageError
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.storage.whole_file import whole_file
 
 _FIGURES = (".png", ".svg", ".pdf")
 

@@ -11,7 +11,7 @@ from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import print_table
 
 if TYPE_CHECKING:
-    from kempf.warehouse.parameter_set import ParameterSet
+    from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def print_parameter_set(

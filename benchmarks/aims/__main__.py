@@ -22,8 +22,8 @@ from kempf.flows.jobs.ingest.files import read_model
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.shooting.windows import windows_of
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments
 
 _TANK = Path(__file__).parents[2] / "docs" / "models" / "tank.yaml"
 _FOLDS, _TANK_S = 4, 20.0

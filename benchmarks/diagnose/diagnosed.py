@@ -11,7 +11,7 @@ from benchmarks import measured_ships, result_page
 from benchmarks.measured_ships import Ship
 from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _DEG = 57.29577951308232
 #: candidates listed beside those that were found

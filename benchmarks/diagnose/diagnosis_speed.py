@@ -22,7 +22,7 @@ from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _REPEATS, _CORES = 5, 2
 _MODEL = Path(__file__).parents[2] / "docs" / "models" / "tank.yaml"

@@ -17,7 +17,7 @@ from kempf.pipeline.diagnose.improves_prediction import better_ahead
 from kempf.pipeline.shooting.ahead import shooting_range
 from kempf.schemas import effects
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _MODEL = Path(__file__).parents[2] / "docs" / "models" / "tank.yaml"
 _FOLDS, _MOST = 4, 4

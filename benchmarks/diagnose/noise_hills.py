@@ -23,7 +23,7 @@ from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 #: how much the fits differ, of each number, and how many there are beside the fit itself
 _DIFFER, _TIMES = 1e-8, 6

@@ -41,7 +41,7 @@ from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import TrialSettings
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _SEED, _CASES, _SHIPS = 20261129, 336, 12
 _STANDARD_DEG = (20.0, 20.0)

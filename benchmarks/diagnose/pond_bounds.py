@@ -22,7 +22,7 @@ from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.shooting.ahead import shooting_range
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 MOVED_S, TIMES = 5.0, 12
 

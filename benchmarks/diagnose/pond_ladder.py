@@ -10,7 +10,7 @@ from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import section
 from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.identify.default_model import default_model_of
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 def main() -> None:

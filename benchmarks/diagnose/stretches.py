@@ -33,7 +33,7 @@ from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import TrialSettings
 from kempf.schemas.effects import catalogue
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _STRETCH_S = 30.0
 #: effects that say that the rudder is late: half a minute does not tell one from another

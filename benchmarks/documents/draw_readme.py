@@ -19,8 +19,8 @@ from kempf.flows.jobs.demo.demonstrate import Demonstration, demonstrate
 from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.segments import Segment
 
 FIGURE = Path(__file__).parents[2] / "docs" / "figures" / "zigzag.png"
 #: Seconds of the approach that are shown.

@@ -94,7 +94,7 @@ def fleet(folder: Path, logs_each: int) -> Path:
     from kempf.pipeline.simulate.logger_profile import logger_profile
     from kempf.pipeline.simulate.mcap_log import to_mcap
     from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     place = folder / "warehouse"
     warehouse = Warehouse(str(place))
@@ -110,8 +110,8 @@ def fleet(folder: Path, logs_each: int) -> Path:
 
 def compared(place: Path, preview: dict[str, Any]) -> int:
     """Count the sets whose values after adopting are, bit for bit, those that were announced."""
-    from kempf.warehouse import parameter_sets
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import parameter_sets
 
     wanted: dict[str, dict[str, float]] = {}
     for move in preview["moves"]:

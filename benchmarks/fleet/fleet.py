@@ -19,7 +19,7 @@ from typing import Any
 
 from benchmarks.fleet import fleet_commits, fleet_figures, fleet_logs, fleet_page, fleet_run
 from kempf.flows.process.cores import usable
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from tests.scale.cluster import Cluster
 from tests.scale.servers import environment, free_port, running
 

@@ -20,10 +20,11 @@ import numpy as np
 import polars as pl
 
 from benchmarks.fleet.history_speed import Template, copies, real_set
-from kempf.warehouse import delta, parameter_sets
-from kempf.warehouse.keys import one_of
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import one_of
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 TABLE = "parameter_sets"
 #: Vessels that share a commit where it is not of one: somewhat more than a batch has, of vessels with some logs each.

@@ -17,8 +17,8 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 DAY_NS = 86_400_000_000_000
 HULLS = ("mariner", "ferry")

@@ -12,8 +12,8 @@ from unittest.mock import patch
 
 from kempf.flows.fleet import plan
 from kempf.flows.process.cores import usable
-from kempf.warehouse import delta
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,9 @@ from kempf.flows.jobs.corrections.correct_segments import plan_for
 from kempf.flows.jobs.repair.repair_warehouse import repair
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import notes, raw, segments
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import notes, raw, segments
+from kempf.warehouse.upkeep.verify import verify
 
 _FLIPS, _SEED, _EVERY = 500, 20261125, 5
 

@@ -26,9 +26,12 @@ import numpy as np
 import polars as pl
 
 from benchmarks.result_page import table, write
-from kempf.warehouse import compaction, delta, history, logs, parameter_sets
-from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import one_of, vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets
+from kempf.warehouse.upkeep import compaction
 
 TARGET_MS = 50.0
 _DAY_NS, _START_NS = 86_400_000_000_000, 1_000_000_000_000_000_000

@@ -23,8 +23,9 @@ import numpy as np
 import yaml
 
 from benchmarks.result_page import table, write
-from kempf.warehouse import delta, runs, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs, vessels
 from tests.flows import content as contents
 
 VESSEL = "mariner"

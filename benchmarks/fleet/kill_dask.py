@@ -16,8 +16,8 @@ from typing import Protocol
 
 from benchmarks.fleet import fleet, fleet_logs, kill
 from benchmarks.result_page import write
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 from tests.scale.cluster import Cluster
 from tests.scale.servers import environment
 

@@ -29,8 +29,8 @@ from benchmarks.fleet.torn_places import Place, Prepared, cut_newest, opened, wa
 from benchmarks.result_page import table, write
 from kempf.flows.jobs.repair.repair_warehouse import repair
 from kempf.schemas.errors import KempfError
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.upkeep.verify import verify
 
 #: Kills a place.
 KILLS = {"local": 140, "S3": 30, "Dask": 30}

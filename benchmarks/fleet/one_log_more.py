@@ -23,9 +23,9 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.warehouse import aliases, logs, parameter_sets
-from kempf.warehouse.compaction import compact
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets
+from kempf.warehouse.upkeep.compaction import compact
 
 _DAY_NS = 86_400_000_000_000
 VESSEL = "ferry"

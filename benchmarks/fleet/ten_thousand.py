@@ -27,10 +27,12 @@ from kempf.flows.fleet.plan import do_batch, plan
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.vessel_report import VesselReport
 from kempf.flows.jobs.state.vessel_state import fleet_state
-from kempf.warehouse import delta, history, runs, vessels
-from kempf.warehouse.compaction import compact
-from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import one_of, vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs, vessels
+from kempf.warehouse.upkeep.compaction import compact
 
 _DAY_NS = 86_400_000_000_000
 #: tables of which every log has a row, and the columns in which its ids and instants stand

@@ -24,9 +24,11 @@ import yaml
 from kempf.schemas.errors import KempfError
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, compaction, logs, notes, parameter_sets, purges, segments, vessels
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, notes, parameter_sets, purges, segments, vessels
+from kempf.warehouse.tables.segments import Segment
+from kempf.warehouse.upkeep import compaction
 
 VESSEL = "ferry"
 _DAY_NS = 86_400_000_000_000

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.fleet.kill_dask import WORKERS, Mortal
 from benchmarks.fleet.torn_jobs import BEGINS, work
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from tests.scale.conftest import KEYS
 from tests.scale.servers import environment, free_port, running
 
@@ -28,7 +28,7 @@ _SERVER = multiprocessing.get_context("forkserver")
 def warm_up() -> None:
     """Let every process begin with what the commands import, so that a kill meets the work and no import."""
     rooms = ("kempf.warehouse", "kempf.flows.jobs", "kempf.workbench.cli")
-    modules = [one.name for room in rooms for one in pkgutil.iter_modules(_folder(room), f"{room}.")]
+    modules = [one.name for room in rooms for one in pkgutil.walk_packages(_folder(room), f"{room}.")]
     _SERVER.set_forkserver_preload(["pandas", "benchmarks.fleet.torn_jobs", *modules])
 
 

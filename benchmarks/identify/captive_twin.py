@@ -29,7 +29,7 @@ from kempf.flows.jobs.predict.checked_prediction import predict_checked
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _DOCS = Path(__file__).parents[2] / "docs"
 _VESSEL = "hsva_kvlcc2"

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float, Series
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.tables.segments import Segment
 
 _HEADING, _RUDDER = "tab:blue", "tab:orange"
 

@@ -42,8 +42,8 @@ from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import segments, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments, vessels
 
 #: ships and runs that take part; every one of them would take an hour
 SHIPS, RUNS = ("aurora", "dorado", "gannet"), ("Z_10_10_P", "Z_20_10_S", "Z_35_10_P")

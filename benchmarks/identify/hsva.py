@@ -23,9 +23,9 @@ from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.estimate.filters.linear_kernel import FASTEST_PER_S
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
+from kempf.warehouse.tables.segments import Segment
 
 LENGTH_M = 7.0
 #: First and second overshoot, deg, beyond the nominal heading and beyond the one at the execute.

@@ -28,7 +28,7 @@ from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.model.ship import Hull
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 TRAINING = ("Z_20_10_P", "Z_20_10_S")
 #: wanted of the linear model on the held-out runs: deg/s and m/s

@@ -31,9 +31,9 @@ from kempf.flows.jobs.identify.standing_model import Own
 from kempf.flows.jobs.identify.vessel_model import store_model
 from kempf.flows.jobs.ingest.files import read_model
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import segments
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 REFERENCE = result_page.RESULTS / "identical"
 SOURCES = ("demo", "trials", "tank")

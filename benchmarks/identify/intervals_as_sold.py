@@ -31,7 +31,7 @@ from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: kinds of sets by their name on the page
 KINDS = {"alone": "one zigzag", "pooled": "pooled"}

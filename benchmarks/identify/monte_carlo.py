@@ -33,7 +33,7 @@ from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 #: The ships that the count is made of.
 HULLS = ("mariner", "container", "tanker", "ferry")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: Lag-1 autocorrelation from which innovations are called not white: they hold fewer values than were counted.
 _NOT_WHITE = 0.3

@@ -33,8 +33,8 @@ from kempf.flows.jobs.predict.predicted import Predicted
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
 
 _MODELS = Path(__file__).parents[2] / "docs" / "models"
 _CIRCLE = ("steady_yaw_rate_deg_s", "advance_m", "transfer_m", "tactical_diameter_m", "speed_loss_percent")

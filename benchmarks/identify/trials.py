@@ -23,8 +23,8 @@ from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.flows.jobs.reprocess.rerun_set import Rerun, rerun
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.segment import loading
 from tests.segment.test_measured import independent_start
 

@@ -27,9 +27,9 @@ from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
+from kempf.warehouse.tables.segments import Segment
 
 #: A boat that makes way does not drift like this for one sample: the course is wrong there.
 _WRONG_RAD = np.deg2rad(20.0)

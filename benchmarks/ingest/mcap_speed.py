@@ -101,7 +101,7 @@ def taking_in(path: Path) -> int:
     """Take a log into a warehouse, all of it: `kempf ingest`."""
     from kempf.flows.jobs.ingest.ingest_logs import ingest
     from kempf.schemas.profile import VesselProfile
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     profile = VesselProfile.model_validate({"sources": [{"match": "*", "channels": CHANNELS}]})
     with TemporaryDirectory() as folder:

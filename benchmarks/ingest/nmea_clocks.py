@@ -24,7 +24,7 @@ from kempf.pipeline.simulate.nmea_log import checksum, to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 HULL = ("a11", "a12", "a21", "a22", "b1", "b2")
 SETTINGS = zigzag_settings("mariner", duration_s=820.0, seed=5)

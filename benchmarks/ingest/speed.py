@@ -107,7 +107,7 @@ def job(log: Path, profile_path: Path, folder: Path) -> dict[str, float]:
     from kempf.flows.jobs.ingest import ingest_logs
     from kempf.flows.jobs.ingest.files import read_profiles
     from kempf.pipeline.ingest.read import read_parts
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     profile = read_profiles([profile_path])
     stages = vars(ingest_logs)

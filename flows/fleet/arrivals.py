@@ -9,7 +9,7 @@ from typing import Any
 
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse.inbox import InboxFile
+from kempf.warehouse.tables.inbox import InboxFile
 
 
 class LogsFailed(DataRejected):

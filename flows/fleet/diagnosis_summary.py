@@ -14,7 +14,7 @@ def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Parameters
     ----------
     diagnoses : sequence of mapping
-        As `kempf.warehouse.diagnoses.StoredDiagnosis.as_json` gives them, or ``{vessel, verdict, error}``.
+        As `kempf.warehouse.tables.diagnoses.StoredDiagnosis.as_json` gives them, or ``{vessel, verdict, error}``.
 
     Returns
     -------

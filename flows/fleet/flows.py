@@ -44,10 +44,10 @@ from kempf.schemas.errors import KempfError
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.quality import NO_LIMITS
-from kempf.warehouse import vessels as vessel_table
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.source_folder import SourceFolder
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.sources.source_folder import SourceFolder
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels as vessel_table
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @task(name="ingest-batch", retries=1, retry_delay_seconds=5)

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 from kempf.flows.process.configuration import setting
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import delta
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
 
 #: Who speaks, and the namespace of the jobs.
 PRODUCER, NAMESPACE = "https://pypi.org/project/kempf", "kempf"

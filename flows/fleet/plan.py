@@ -14,9 +14,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import runs
-from kempf.warehouse.runs import FlowRun
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
+from kempf.warehouse.tables.runs import FlowRun
 
 #: With so many logs a batch is full: a minute or two of work, beside which what an engine asks for a task and the
 #: tables for a commit is small, and little enough that a lost worker costs no more and progress is seen.

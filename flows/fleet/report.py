@@ -9,7 +9,7 @@ from typing import Any
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality, in_words
-from kempf.warehouse.keys import segment_of_address
+from kempf.warehouse.storage.keys import segment_of_address
 
 #: Rows of a table that a page can still show; of a larger fleet those where nothing happened are left out.
 MOST_ROWS = 1000

@@ -10,9 +10,9 @@ from shutil import copytree
 
 import pytest
 
-from kempf.warehouse import aliases, parameter_sets, segments
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, segments
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.notebook.warehouse_view import open_warehouse
 from kempf.workbench.terminal import WIDEST
 from tests.conftest import Ship

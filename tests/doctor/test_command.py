@@ -9,8 +9,8 @@ import yaml
 
 from kempf.flows.jobs.identify.parameter_set_of import channel_warnings
 from kempf.flows.jobs.ingest.ingest_logs import ingest
-from kempf.warehouse import examinations, logs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import examinations, logs
 from tests.doctor import closed_form_ship
 from tests.workbench.driving import kempf
 

@@ -9,8 +9,8 @@ from typing import Any
 from pyarrow import fs
 
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
 
 #: Runs record how the work went, which an interruption changes.
 RUNS = ("runs", "run_history")

@@ -17,8 +17,8 @@ from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effects import get
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def made(**samples: tuple[float | None, float | None]) -> ParameterSet:

@@ -27,9 +27,11 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import aliases, delta, history, logs, parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.flows.content import fresh
 
 DAY_NS = 86_400_000_000_000

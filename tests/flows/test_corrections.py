@@ -21,8 +21,9 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.flows.jobs.state.out_of_date import unsearched
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse import aliases, corrections, examinations, history, logs, notes, parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, examinations, logs, notes, parameter_sets, segments
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.late import VESSEL

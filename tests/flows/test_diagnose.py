@@ -19,8 +19,8 @@ from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_set import code_changed, inputs_of, rerun
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
 from tests.flows.content import fresh
 from tests.late import SOME, VESSEL, some_effects
 from tests.workbench.driving import kempf, refused

@@ -13,8 +13,8 @@ from kempf.flows.process.fit_report import FitReport, reported_to
 from kempf.flows.process.progress import Figures, silent
 from kempf.pipeline.estimate.iteration import SILENT, Iteration
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
 from tests.flows.content import fresh
 from tests.flows.test_brought_forward import take_in
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from kempf.warehouse import aliases, logs, parameter_sets, runs, segments, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, runs, segments, vessels
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
 

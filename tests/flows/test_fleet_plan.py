@@ -19,8 +19,8 @@ from kempf.flows.jobs.state.vessel_state import fleet_state as state_of
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, runs, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, runs, vessels
 from kempf.workbench.web.addresses import of_vessel
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions

@@ -17,8 +17,8 @@ from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import catalogue
-from kempf.warehouse import aliases
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases
 from tests.workbench.driving import kempf, refused
 
 VESSEL = late_rudder.VESSEL

@@ -15,9 +15,9 @@ from kempf.flows.jobs.corrections.remove_logs import remove, remove_vessel, rena
 from kempf.flows.jobs.inbox.release_log import dismiss, release
 from kempf.flows.jobs.inbox.take_inbox import NeedsAPerson, take_inbox
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
-from kempf.warehouse import inbox, logs, vessels
-from kempf.warehouse.source_folder import SourceFolder
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.sources.source_folder import SourceFolder
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import inbox, logs, vessels
 from tests.conftest import Ship
 from tests.workbench.driving import kempf
 

@@ -18,8 +18,9 @@ import yaml
 from kempf.flows.jobs.identify.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import delta, logs, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, segments
 from tests.flows.content import fresh, seen
 
 ROOT = Path(__file__).parents[2]

@@ -20,8 +20,8 @@ from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, logs, parameter_sets, readings, runs, segments, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, readings, runs, segments, vessels
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
 

@@ -19,8 +19,8 @@ from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.diagnose import instrument_noise
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.schemas.instrument_noise import NAMES
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.workbench.driving import kempf
 
 FRESH = Case(

@@ -11,9 +11,9 @@ from benchmarks.diagnose.late_rudder import VESSEL
 from kempf.flows.jobs.diagnose.rival_models import Rivals
 from kempf.flows.jobs.predict import predict_vessel
 from kempf.flows.jobs.predict.next_trial import next_trial
-from kempf.warehouse import parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @pytest.fixture(scope="module")

@@ -27,9 +27,10 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, history, logs, notes, parameter_sets, segments, vessels
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, notes, parameter_sets, segments, vessels
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf
 

@@ -30,9 +30,9 @@ from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.warehouse import aliases, parameter_sets, segments
-from kempf.warehouse.parameter_set import Bounds
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, segments
+from kempf.warehouse.tables.parameter_set import Bounds
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf

@@ -19,11 +19,14 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_all import verify_all
 from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import compaction, delta, diagnoses, history, logs, parameter_sets, purges, raw, readings
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses, logs, parameter_sets, purges, raw, readings
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.verify import verify
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf, refused

@@ -18,9 +18,9 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.vessel_quality import marks, quality_of
 from kempf.schemas.errors import UsageError
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Limits, Quality
-from kempf.warehouse import logs, parameter_sets, segments
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets, segments
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf

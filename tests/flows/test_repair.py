@@ -20,22 +20,11 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.state.former_vessel import former_vessels
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import (
-    aliases,
-    compaction,
-    corrections,
-    delta,
-    logs,
-    notes,
-    parameter_sets,
-    purges,
-    raw,
-    segments,
-    table_cache,
-    vessels,
-)
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.storage import delta, table_cache
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, logs, notes, parameter_sets, purges, raw, segments, vessels
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.verify import verify
 from tests.conftest import Ship
 from tests.flows.content import fresh, seen
 from tests.flows.test_brought_forward import take_in

@@ -25,21 +25,13 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import (
-    code_version,
-    compaction,
-    delta,
-    equivalents,
-    examinations,
-    history,
-    logs,
-    parameter_sets,
-    provenance,
-    runs,
-    segments,
-)
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import equivalents, examinations, logs, parameter_sets, provenance, runs, segments
+from kempf.warehouse.tables.parameter_set import ParameterSet, StoredValue
+from kempf.warehouse.upkeep import compaction
 from tests.flows.content import fresh, seen
 from tests.warehouse.samples import parameter_set
 from tests.workbench.driving import kempf, refused, tree

@@ -11,10 +11,10 @@ import pytest
 from kempf.flows.jobs.diagnose import rival_models
 from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import diagnoses, parameter_sets
-from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses, parameter_sets
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from tests.warehouse.samples import inputs, parameter_set
 
 

@@ -18,10 +18,11 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
-from kempf.warehouse import history, parameter_sets, segments
-from kempf.warehouse.deduplicate import once
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.queries.deduplicate import once
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
+from kempf.warehouse.tables.segments import Segment
 from tests.flows.content import fresh
 from tests.warehouse.samples import segment
 from tests.workbench.driving import kempf

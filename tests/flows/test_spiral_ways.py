@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from kempf.flows.jobs.predict.spiral_ways import orders_of, rates_of
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.tables.segments import Segment
 from tests.warehouse.samples import segment
 
 

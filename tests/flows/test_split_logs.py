@@ -6,7 +6,7 @@ from pathlib import Path
 
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from tests.ingest.test_mcap import CHANNELS, plain, write
 
 PROFILE = VesselProfile.model_validate({"vessel": "launch", "sources": [{"match": "*.mcap", "channels": CHANNELS}]})

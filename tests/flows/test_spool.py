@@ -16,7 +16,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap import decode
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import seen
 

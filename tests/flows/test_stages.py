@@ -17,8 +17,10 @@ from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
-from kempf.warehouse import delta, history, logs, parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets, segments
 from tests.flows.content import RUNS, fresh
 from tests.workbench.driving import ROOT, START
 

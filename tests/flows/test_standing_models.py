@@ -15,8 +15,10 @@ from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, code_version, history, logs, parameter_sets, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, vessels
 
 SETTINGS = zigzag_settings("ferry", duration_s=400.0, steady_s=60.0)
 CALM = Request(ModelSpec(name="calm", current="none"))

@@ -14,7 +14,7 @@ from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile, parse
 from kempf.schemas.surroundings import default_model
-from kempf.warehouse import parameter_sets
+from kempf.warehouse.tables import parameter_sets
 from tests.flows.test_shared_start import elapsed, ingested, profile, trial
 from tests.workbench.driving import kempf
 

@@ -16,8 +16,8 @@ import yaml
 
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import delta
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
 from tests.flows.content import fresh, seen
 from tests.workbench.driving import kempf
 
@@ -116,8 +116,8 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     code = (
         "import os, sys\n"
         "import deltalake, polars, pyarrow.fs, kempf.flows.jobs.ingest.ingest_logs, kempf.workbench.cli.ingest\n"
-        "from kempf.warehouse import delta\n"
-        "from kempf.warehouse.store import Warehouse\n"
+        "from kempf.warehouse.storage import delta\n"
+        "from kempf.warehouse.storage.store import Warehouse\n"
         "from kempf.workbench.cli import main\n"
         "left = [0]\n"
         "def dying(write):\n"

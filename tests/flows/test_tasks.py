@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kempf.warehouse import parameter_sets
+from kempf.warehouse.tables import parameter_sets
 from tests.flows.content import fresh
 
 

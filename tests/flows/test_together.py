@@ -17,8 +17,9 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel, reproc
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, delta, parameter_sets, runs, segments, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, runs, segments, vessels
 from tests.conftest import Ship
 from tests.flows.content import RUNS, fresh, seen
 

@@ -16,8 +16,9 @@ from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.state.former_vessel import former_vessels
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
-from kempf.warehouse import aliases, history, logs, notes, parameter_sets, raw, segments, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, notes, parameter_sets, raw, segments, vessels
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf

@@ -22,10 +22,11 @@ from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, history, logs, parameter_sets, segments, vessels
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, segments, vessels
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.parameter_set import ParameterSet, parameter_set_id
 from tests.warehouse import samples
 
 PLAIN = ModelSpec()

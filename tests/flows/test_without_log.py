@@ -27,9 +27,9 @@ from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, 
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.units import SECOND_NS
-from kempf.warehouse import parameter_sets, segments
-from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
+from kempf.warehouse.tables.parameter_set import ParameterSet, parameter_set_id
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf
 

@@ -19,7 +19,7 @@ from benchmarks.diagnose.hidden_effects.programme import DISTURBANCES
 from benchmarks.diagnose.hidden_effects.seal import open_sealed, seal
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 def test_the_sample_is_balanced_and_large_enough(sample):

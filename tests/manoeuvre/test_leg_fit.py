@@ -15,9 +15,9 @@ from kempf.flows.jobs.identify.leg_fit import fitted_to_legs
 from kempf.flows.jobs.identify.standing_model import standing
 from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse import parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.export import as_control, as_text, linear
 from tests.late import VESSEL
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from benchmarks import measured_ships
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from tests.real_data.voyage import SHARED, Voyage, require, sail
 from tests.workbench.web.browsing import launched
 

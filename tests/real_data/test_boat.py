@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from kempf.flows.jobs.identify.identify_vessel import identify_vessel
-from kempf.warehouse import parameter_sets
+from kempf.warehouse.tables import parameter_sets
 from tests.real_data.voyage import Voyage
 
 

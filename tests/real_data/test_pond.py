@@ -14,8 +14,8 @@ from kempf.flows.jobs.identify.parameter_set_of import SetRequest
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 from tests.real_data.voyage import SHARED, require
 
 PROFILE = VesselProfile.model_validate(

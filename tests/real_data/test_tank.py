@@ -11,7 +11,7 @@ from kempf.flows.jobs.identify.identify_vessel import Request, build, inputs_of
 from kempf.flows.jobs.identify.parameter_set_of import SetRequest
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.pipeline.channels.instruments import from_readings
-from kempf.warehouse import readings
+from kempf.warehouse.tables import readings
 from tests.real_data.voyage import Voyage
 
 

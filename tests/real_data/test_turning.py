@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from kempf.flows.jobs.ingest.log_channels import channels_of
-from kempf.warehouse import segments
+from kempf.warehouse.tables import segments
 from tests.real_data.voyage import SHARED, Voyage
 
 #: Rudder and side of each, and when its rudder was put over, s, as the columns show.

@@ -10,7 +10,7 @@ import pytest
 from benchmarks import measured_ships
 from benchmarks.measured_ships import Ship
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 

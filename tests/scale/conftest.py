@@ -14,8 +14,8 @@ from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 from tests.conftest import Ship
 from tests.scale.servers import environment, free_port, running
 

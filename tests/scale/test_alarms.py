@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import logs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs
 from tests.scale.conftest import FLEET, prefect_server, reporting_to, touch
 from tests.scale.servers import receiver, wait_for
 

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from kempf.flows.fleet.plan import do_fleet
-from kempf.warehouse import runs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
 from tests.flows.content import seen
 from tests.scale.cluster import Cluster, Worker
 from tests.scale.conftest import FLEET, Bucket, Server, touch

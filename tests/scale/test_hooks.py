@@ -11,8 +11,9 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import delta, logs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs
 from tests.scale.conftest import FLEET, touch
 from tests.scale.servers import free_port, received_text, receiver
 

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from kempf.flows.fleet.plan import do_fleet, plan
-from kempf.warehouse import logs, runs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, runs
 from tests.flows.content import seen
 from tests.scale.conftest import FLEET, Server, touch
 from tests.scale.servers import ROOT, environment, running, wait_for

@@ -25,7 +25,7 @@ import duckdb
 import pytest
 import yaml
 
-from kempf.warehouse import code_version
+from kempf.warehouse.code import code_version
 from tests.conftest import Ship
 from tests.scale import compose, image
 from tests.scale.compose import Place
@@ -91,7 +91,8 @@ def place(built: Image, installed: dict[Path, int], ferry: Ship) -> Iterator[Pla
 
 def test_the_image_holds_what_the_tests_ran_on(built: Image) -> None:
     run = [built.here("/opt/kempf/bin/python"), "-c"]
-    asks = "from kempf.warehouse import code_version as c; print(c.git_commit(), c.fingerprint('estimate'), c.__file__)"
+    asks = "print(c.git_commit(), c.fingerprint('estimate'), c.__file__)"
+    asks = f"from kempf.warehouse.code import code_version as c; {asks}"
     done = subprocess.run(
         [*run, asks], env=built.environment(), cwd=built.folder, capture_output=True, text=True, check=True
     )
@@ -294,7 +295,7 @@ def test_the_image_is_built_and_run_by_an_engine() -> None:
     name = "kempf:tested"
     build = [docker, "build", "--quiet", "--file", image.DOCKERFILE, "--build-arg", f"KEMPF_COMMIT={COMMIT}", "--tag"]
     subprocess.run([*build, name, ROOT], check=True, capture_output=True)
-    asks = "import os; from kempf.warehouse import code_version as c; print(os.getuid(), c.git_commit())"
+    asks = "import os; from kempf.warehouse.code import code_version as c; print(os.getuid(), c.git_commit())"
     for command, said in (
         (["python", "-c", asks], f"1000 {COMMIT}"),
         (["kempf", "--version"], f"kempf, version {version()}"),

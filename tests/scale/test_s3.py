@@ -25,25 +25,15 @@ from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import (
-    aliases,
-    compaction,
-    delta,
-    logs,
-    parameter_sets,
-    purges,
-    raw,
-    readings,
-    runs,
-    segments,
-    vessels,
-)
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_month, chain, commits
-from kempf.warehouse.source_folder import SourceFolder
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.sources.source_folder import SourceFolder
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.marker import LAYOUT, Marker
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, purges, raw, readings, runs, segments, vessels
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.migrations import by_month, chain, commits
+from kempf.warehouse.upkeep.verify import verify
 from tests.conftest import Ship
 from tests.flows.content import seen
 from tests.scale.conftest import Bucket

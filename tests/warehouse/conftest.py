@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 @pytest.fixture

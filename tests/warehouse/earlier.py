@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from kempf.warehouse.keys import earlier_key, vessel_key
+from kempf.warehouse.storage.keys import earlier_key, vessel_key
 
 
 def write_earlier_keys(patched: pytest.MonkeyPatch) -> None:

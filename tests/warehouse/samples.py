@@ -9,12 +9,12 @@ import polars as pl
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import raw
-from kempf.warehouse.deposit import Delivery
-from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, StoredValue, parameter_set_id
-from kempf.warehouse.segments import Segment, segment_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import raw
+from kempf.warehouse.tables.deposit import Delivery
+from kempf.warehouse.tables.examinations import StoredExamination
+from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet, StoredValue, parameter_set_id
+from kempf.warehouse.tables.segments import Segment, segment_id
 
 START_NS = 1_746_258_421_147_000_001
 CODE = "0123456789abcdef"

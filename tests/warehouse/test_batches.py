@@ -11,8 +11,8 @@ import pytest
 
 from kempf.flows.process.release_memory import give_back
 from kempf.schemas.tables import TABLES, arrow_schema
-from kempf.warehouse import delta
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
 
 ROWS = 40_000
 

@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from kempf.schemas.effect import Effect
-from kempf.warehouse import code_version
-from kempf.warehouse.code_version import Stage
-from kempf.warehouse.source_tree import read_module
+from kempf.warehouse.code import code_version
+from kempf.warehouse.code.code_version import Stage
+from kempf.warehouse.code.source_tree import read_module
 
 ROOT = Path(__file__).parents[2]
 
@@ -121,8 +121,8 @@ def test_a_package_may_say_which_commit_it_was_built_from(tmp_path: Path) -> Non
 
 def test_importing_the_store_loads_no_heavy_library() -> None:
     code = (
-        "import sys, kempf.warehouse.store, kempf.warehouse.raw;"
-        "import kempf.warehouse.delta, kempf.warehouse.code_version, kempf.warehouse.history;"
+        "import sys, kempf.warehouse.storage.store, kempf.warehouse.tables.raw;"
+        "import kempf.warehouse.storage.delta, kempf.warehouse.code.code_version, kempf.warehouse.queries.history;"
         "print(sorted({'deltalake', 'pyarrow', 'polars', 'numpy'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

@@ -14,22 +14,14 @@ import pytest
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.tables import TABLES, arrow_schema
-from kempf.warehouse import (
-    aliases,
-    compaction,
-    delta,
-    examinations,
-    history,
-    logs,
-    parameter_sets,
-    readings,
-    runs,
-    segments,
-)
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.provenance import collect
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, examinations, logs, parameter_sets, readings, runs, segments
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.tables.provenance import collect
+from kempf.warehouse.upkeep import compaction
 from tests.warehouse.samples import START_NS, delivery, examination, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
 

@@ -11,9 +11,10 @@ import pytest
 
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import delta, logs, parameter_sets, readings, retry, vessels
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta, retry
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets, readings, vessels
+from kempf.warehouse.tables.deposit import deposit
 from tests.warehouse.samples import delivery, inputs, parameter_set
 
 SPAWN = multiprocessing.get_context("spawn")

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from kempf.warehouse.deduplicate import once
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.queries.deduplicate import once
+from kempf.warehouse.tables.segments import Segment
 from tests.warehouse.samples import segment
 
 BEGIN_NS, SECOND_NS = 10**18, 10**9

@@ -13,10 +13,11 @@ from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, logs, raw, readings, vessels
-from kempf.warehouse.deposit import deposit, held
-from kempf.warehouse.keys import ingest_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import ingest_id
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, raw, readings, vessels
+from kempf.warehouse.tables.deposit import deposit, held
 from tests.warehouse.samples import CODE, delivery, raw_bytes
 from tests.warehouse.samples import readings as some_readings
 

@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from kempf.warehouse import delta, runs, table_cache
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta, table_cache
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,7 +44,7 @@ def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
     put(warehouse, "one")
     assert stands(warehouse) == {"run-1": "one"}
     code = (
-        "from kempf.warehouse import runs; from kempf.warehouse.store import Warehouse\n"
+        "from kempf.warehouse.tables import runs; from kempf.warehouse.storage.store import Warehouse\n"
         f"runs.record_all(Warehouse({warehouse.uri!r}), [runs.FlowRun('run-1', 'ingest', None, 'two')])"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)

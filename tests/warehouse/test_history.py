@@ -9,9 +9,12 @@ from deltalake import DeltaTable
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import compaction, delta, history, parameter_sets, vessels
-from kempf.warehouse.parameter_set import StoredValue
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, vessels
+from kempf.warehouse.tables.parameter_set import StoredValue
+from kempf.warehouse.upkeep import compaction
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import logs, marker
-from kempf.warehouse.marker import LAYOUT, MARKER, Marker
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import marker
+from kempf.warehouse.storage.marker import LAYOUT, MARKER, Marker
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs
 
 
 def layout_for_layout_2(written: bytes) -> int | None:

@@ -15,13 +15,14 @@ from deltalake.exceptions import CommitFailedError
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import aliases, delta, parameter_sets, readings, seals, table_cache
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.keys import earlier_key
-from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_month, chain, commits, to_3
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import Problem, verify
+from kempf.warehouse.storage import delta, seals, table_cache
+from kempf.warehouse.storage.keys import earlier_key
+from kempf.warehouse.storage.marker import LAYOUT, Marker
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, readings
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.upkeep.migrations import by_month, chain, commits, to_3
+from kempf.warehouse.upkeep.verify import Problem, verify
 from tests.flows.content import seen
 from tests.warehouse.earlier import look, write_earlier_keys
 from tests.warehouse.samples import delivery, inputs, parameter_set

@@ -7,11 +7,12 @@ import pytest
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, delta, parameter_sets, provenance
-from kempf.warehouse.agreement import content_digest, differences, verdict
-from kempf.warehouse.canonical import canonical_json
-from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.canonical import canonical_json
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, provenance
+from kempf.warehouse.tables.agreement import content_digest, differences, verdict
+from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError, NotFound
-from kempf.warehouse import raw
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import raw
 from tests.warehouse.samples import raw_bytes
 
 

@@ -16,26 +16,15 @@ from deltalake.exceptions import CommitFailedError
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.profile import VesselProfile
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import (
-    aliases,
-    delta,
-    diagnoses,
-    examinations,
-    keys,
-    notes,
-    parameter_sets,
-    purges,
-    readings,
-    table_cache,
-    vessels,
-)
-from kempf.warehouse import segments as segment_table
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.keys import earlier_key, vessel_key
-from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_name, chain, commits
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.storage import delta, keys, table_cache
+from kempf.warehouse.storage.keys import earlier_key, vessel_key
+from kempf.warehouse.storage.marker import LAYOUT, Marker
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, diagnoses, examinations, notes, parameter_sets, purges, readings, vessels
+from kempf.warehouse.tables import segments as segment_table
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.upkeep.migrations import by_name, chain, commits
+from kempf.warehouse.upkeep.verify import verify
 from tests.flows.content import seen
 from tests.warehouse.earlier import look, write_earlier_keys
 from tests.warehouse.samples import delivery, examination, parameter_set, segment

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
-from kempf.warehouse import delta, runs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
 
 
 def test_a_run_is_stored_as_it_stands(warehouse: Warehouse) -> None:

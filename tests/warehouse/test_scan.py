@@ -7,8 +7,10 @@ from typing import Any
 import pytest
 from deltalake import DeltaTable
 
-from kempf.warehouse import compaction, delta, runs
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
+from kempf.warehouse.upkeep import compaction
 
 ODD = (
     *("o'brien", 'a"b', "ø", "100%", "%41", "a/b", "a\\b", "", " lead", "a\nb", "'; --", "$1", "{x}", "a\x00", "\x00a"),

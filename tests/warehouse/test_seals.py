@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import compaction, delta, runs, seals, table_cache
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import damages, verify
+from kempf.warehouse.storage import delta, seals, table_cache
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.verify import damages, verify
 
 
 @pytest.fixture

@@ -7,11 +7,12 @@ from dataclasses import replace as changed
 import pytest
 
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import delta, segments
-from kempf.warehouse.canonical import canonical_json
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.canonical import canonical_json
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.tables.segments import Segment
 from tests.warehouse.samples import START_NS, delivery, segment
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kempf.warehouse import source_tree
-from kempf.warehouse.source_tree import SourceTree, read_module, read_yaml
+from kempf.warehouse.code import source_tree
+from kempf.warehouse.code.source_tree import SourceTree, read_module, read_yaml
 
 CALLER = """
 from kempf.pipeline.rooms import b

@@ -9,24 +9,14 @@ import pytest
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import (
-    aliases,
-    compaction,
-    delta,
-    history,
-    logs,
-    parameter_sets,
-    raw,
-    readings,
-    runs,
-    segments,
-    table_cache,
-    vessels,
-)
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.marker import MARKER
-from kempf.warehouse.migrations.chain import repair_marker
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta, table_cache
+from kempf.warehouse.storage.marker import MARKER
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, logs, parameter_sets, raw, readings, runs, segments, vessels
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.migrations.chain import repair_marker
 from tests.warehouse.samples import delivery, raw_bytes
 
 READERS = {
@@ -133,8 +123,8 @@ def test_an_address_that_cannot_be_used_is_refused(address: str) -> None:
 
 @pytest.mark.parametrize("name", ["a b ø", "a#b", "O'Brien", "a+b,c", "a:b", "readings/logs", "a&b", "ä~(1)"])
 def test_folders_with_odd_names_hold_a_warehouse(tmp_path: Path, name: str) -> None:
-    from kempf.warehouse import readings
-    from kempf.warehouse.deposit import deposit
+    from kempf.warehouse.tables import readings
+    from kempf.warehouse.tables.deposit import deposit
     from tests.warehouse.samples import delivery
 
     warehouse = Warehouse(str(tmp_path / name))

@@ -10,8 +10,10 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.warehouse import delta, history, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 
 def test_a_new_profile_supersedes_and_the_past_stays(tmp_path: Path) -> None:

@@ -10,10 +10,12 @@ import pytest
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import compaction, delta, logs, parameter_sets, written
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
+from kempf.warehouse.storage import delta, written
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets
+from kempf.warehouse.tables.deposit import deposit
+from kempf.warehouse.upkeep import compaction
+from kempf.warehouse.upkeep.verify import verify
 from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set
 
 

@@ -4,10 +4,11 @@ import pytest
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import delta, logs, readings, vessels
-from kempf.warehouse.deposit import deposit
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, readings, vessels
+from kempf.warehouse.tables.deposit import deposit
 from tests.warehouse.samples import delivery
 
 ODD_NAMES = [

@@ -7,7 +7,7 @@ from threading import Barrier, Thread
 
 import pytest
 
-from kempf.warehouse.whole_file import whole_file
+from kempf.warehouse.storage.whole_file import whole_file
 
 
 def test_a_file_takes_the_place_of_another_once_it_is_whole(tmp_path: Path) -> None:

@@ -89,8 +89,8 @@ def tree(folder: Path) -> dict[str, str]:
 
 def versions(folder: Path) -> dict[str, int]:
     """The newest version of every table of a warehouse."""
-    from kempf.warehouse import delta
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage import delta
+    from kempf.warehouse.storage.store import Warehouse
 
     return delta.versions(Warehouse(str(folder)))
 

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 import yaml
 
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
 from kempf.workbench.documents.compared_sets import without_dimension
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, refused

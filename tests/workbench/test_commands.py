@@ -260,7 +260,7 @@ def test_the_demonstration_finds_the_truth(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_a_fault_of_our_own_is_reported_as_one(filled: Path, monkeypatch: pytest.MonkeyPatch):
-    from kempf.warehouse import logs
+    from kempf.warehouse.tables import logs
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("division by zero")

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import parameter_sets, segments, vessels
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments, vessels
+from kempf.warehouse.tables.parameter_set import ParameterSet, StoredValue
 from tests.history.made import NAMES, UNITS, history, step
 from tests.warehouse.samples import inputs, parameter_set, segment
 from tests.workbench.driving import Ran, kempf, refused

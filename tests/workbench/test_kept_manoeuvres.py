@@ -12,8 +12,8 @@ from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
-from kempf.warehouse import parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
 from tests.segment.sailed import direct_spiral
 from tests.workbench.driving import Ran, kempf
 

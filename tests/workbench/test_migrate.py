@@ -25,12 +25,13 @@ import kempf as kempf_package
 from kempf.flows.fleet import flows
 from kempf.flows.jobs.inbox.take_inbox import take_inbox
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import delta, logs, parameter_sets, seals
-from kempf.warehouse.keys import earlier_key, vessel_key
-from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations.chain import forward
-from kempf.warehouse.source_folder import SourceFolder
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.sources.source_folder import SourceFolder
+from kempf.warehouse.storage import delta, seals
+from kempf.warehouse.storage.keys import earlier_key, vessel_key
+from kempf.warehouse.storage.marker import LAYOUT, Marker
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets
+from kempf.warehouse.upkeep.migrations.chain import forward
 from tests.flows.content import LASTING, seen
 from tests.workbench.driving import environment, kempf, refused, tree
 
@@ -214,9 +215,9 @@ def test_what_is_purged_after_is_gone_from_the_files_of_before_too(tmp_path: Pat
 DYING = """
 import os, signal, sys
 from kempf.flows.jobs.repair.migrate_warehouse import migrate
-from kempf.warehouse import delta, seals
-from kempf.warehouse.migrations import by_month, by_name, commits
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta, seals
+from kempf.warehouse.upkeep.migrations import by_month, by_name, commits
+from kempf.warehouse.storage.store import Warehouse
 
 by_month.MOST_LOGS = by_name.MOST_FOLDERS = 1
 count, last = 0, int(sys.argv[2])

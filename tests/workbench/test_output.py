@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from kempf.warehouse import parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
 from kempf.workbench.ranked_warnings import of_several, ranked
 from kempf.workbench.terminal import WIDEST, print_table, short_ids
 from tests.workbench.driving import kempf, one_of

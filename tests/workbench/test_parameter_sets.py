@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import yaml
 
-from kempf.warehouse import delta, parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
 from kempf.workbench.parameter_set_table import print_parameter_set
 from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, one_of, refused, sets

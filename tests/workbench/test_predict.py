@@ -15,8 +15,8 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, TurningCircle
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, TrialSettings, simulate_trial
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
 from tests.conftest import Ship
 from tests.workbench.driving import Ran, kempf
 

@@ -23,9 +23,9 @@ def modelled(_filled: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A warehouse whose ship stands at a model with an effect; its sets hold the numbers of another."""
     from kempf.flows.jobs.identify.chosen_manoeuvres import choose
     from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, inputs_of, point
-    from kempf.warehouse import parameter_sets
-    from kempf.warehouse.parameter_set import parameter_set_id
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import parameter_sets
+    from kempf.warehouse.tables.parameter_set import parameter_set_id
 
     folder = copytree(_filled, tmp_path_factory.mktemp("modelled") / "warehouse")
     warehouse = Warehouse(str(folder))

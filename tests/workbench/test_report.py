@@ -25,8 +25,9 @@ from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED
 from kempf.pipeline.diagnose.verdict import Verdict
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import delta, diagnoses
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses
 from kempf.workbench.figures import diagnosis_confusion, diagnosis_effects, diagnosis_ladder, diagnosis_zigzag
 from kempf.workbench.figures.diagnosis_style import bytes_of
 from kempf.workbench.report import sections

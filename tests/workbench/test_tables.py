@@ -16,8 +16,11 @@ from kempf.flows.jobs.corrections.correct_segments import plan_for
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
-from kempf.warehouse import compaction, delta, history, parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
+from kempf.warehouse.upkeep import compaction
 from tests.conftest import Ship
 from tests.warehouse.samples import inputs, parameter_set
 from tests.workbench.driving import kempf

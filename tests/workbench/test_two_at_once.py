@@ -8,9 +8,9 @@ import pytest
 
 from kempf.flows.jobs.diagnose import add_effect as job
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def test_a_model_that_came_meanwhile_stays(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,12 +9,12 @@ import click
 from kempf.workbench.terminal import print_json
 
 if TYPE_CHECKING:
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
 
 def take_back(warehouse: Warehouse, *, as_json: bool) -> None:
     """Let the present code count as itself again, and say what it counted as."""
-    from kempf.warehouse import equivalents
+    from kempf.warehouse.tables import equivalents
 
     warehouse.require()
     entries = equivalents.withdraw(warehouse)

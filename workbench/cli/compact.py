@@ -37,8 +37,8 @@ def command(more_files_than: int, vacuum: bool, days: float, dry_run: bool, uri:
     Every version stays readable. With --vacuum, versions may go that no parameter set was made from, that are older
     than --older-than, and that `kempf history --as-of` does not need.
     """
-    from kempf.warehouse import compaction
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.upkeep import compaction
 
     warehouse = Warehouse(uri)
     tables = () if dry_run else compaction.compact(warehouse, more_files_than)

@@ -77,7 +77,7 @@ def command(
     """
     from kempf.flows.jobs.compare.compare_vessel import compare_vessel
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     if fail_above is not None and not isfinite(fail_above):
         raise UsageError("threshold", f"--fail-above {fail_above} is no limit.", "Give a percentage such as 20.")

@@ -16,8 +16,8 @@ from kempf.workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.corrections.correct_segments import Planned
-    from kempf.warehouse.segments import Segment
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables.segments import Segment
 
 
 @click.command("correct", cls=GivenOnce)
@@ -33,8 +33,8 @@ def correct(
 ) -> None:
     """Give a zigzag other bounds; executes and overshoots are measured again between them."""
     from kempf.flows.jobs.corrections.correct_segments import plan_for
-    from kempf.warehouse import segments
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import segments
 
     if start is None and end is None:
         raise UsageError("no_bounds", "Neither --start nor --end is given.", "Give the one that is to change, or both.")
@@ -56,7 +56,7 @@ def correct(
 def exclude(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a manoeuvre count no longer: nothing is fitted to it, pooled with it or compared with it."""
     from kempf.flows.jobs.corrections.correct_segments import plan_for
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     warehouse = Warehouse(uri)
     _carry_out(warehouse, plan_for(warehouse, segment_id, "exclude", reason), yes=yes, as_json=as_json)
@@ -71,7 +71,7 @@ def exclude(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) ->
 def accept(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a manoeuvre count as the search found it, or as it was added: undoes an exclusion and other bounds."""
     from kempf.flows.jobs.corrections.correct_segments import plan_for
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     warehouse = Warehouse(uri)
     _carry_out(warehouse, plan_for(warehouse, segment_id, "accept", reason), yes=yes, as_json=as_json)
@@ -88,7 +88,7 @@ def accept(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
 def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Add a zigzag that the search did not find, by its bounds in a log."""
     from kempf.flows.jobs.corrections.correct_segments import plan_new
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     warehouse = Warehouse(uri)
     bounds = utc_ns_of(start, "--start"), utc_ns_of(end, "--end")
@@ -102,8 +102,9 @@ def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_jso
 def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
     """List every correction that was made, with its reason and when."""
     from kempf.schemas.instants import iso_utc
-    from kempf.warehouse import append_only, corrections, logs, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage import append_only
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import corrections, logs, vessels
 
     warehouse = Warehouse(uri)
     warehouse.require()

@@ -14,7 +14,7 @@ from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.demo.demonstrate import Demonstration
-    from kempf.warehouse.parameter_set import ParameterSet
+    from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @click.command("demo", cls=GivenOnce)

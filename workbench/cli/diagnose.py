@@ -19,7 +19,7 @@ from kempf.workbench.rungs import compared, first_model
 from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
 _SHOWN = 12
 
@@ -56,7 +56,7 @@ def command(
         return
     from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
     from kempf.flows.jobs.identify.standing_model import Own
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
     warehouse = Warehouse(uri)
@@ -77,7 +77,7 @@ def command(
 
 def _print_at_hand(warehouse: Warehouse, document: Mapping[str, Any]) -> None:
     """Say which manoeuvres that were kept for validation are there to hold models against that fit alike."""
-    from kempf.warehouse import segments
+    from kempf.warehouse.tables import segments
 
     if not any(len(group["effects"]) > 1 for group in document["sets"]):
         return

@@ -32,7 +32,7 @@ def command(
     from kempf.flows.jobs.ingest.examine_log import examine_file, examine_held
     from kempf.flows.jobs.ingest.files import read_profiles
     from kempf.schemas.profile import VesselProfile
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.new_file import require_figures, writing
 
     require_figures(figure)

@@ -34,7 +34,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     """
     from kempf.flows.jobs.diagnose.try_formula import formula_of_ones_own, tried
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     formula_of_ones_own(name, formula)
     warehouse = Warehouse(uri)
@@ -101,7 +101,7 @@ def add(
     """
     from kempf.flows.jobs.diagnose.add_effect import add_effect
     from kempf.flows.jobs.identify.standing_model import Own, rungs_to
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
     if formula is not None and path is not None:
@@ -176,7 +176,7 @@ def _scaled(value: float | None, factor: float) -> float | None:
 def undo(vessel: str, uri: str, as_json: bool) -> None:
     """Go back to the model before the last effect was added; nothing is deleted."""
     from kempf.flows.jobs.identify.standing_model import undo as go_back
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     now = go_back(Warehouse(uri), vessel)
     if as_json:

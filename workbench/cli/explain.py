@@ -28,7 +28,7 @@ def command(
     effect is there, `kempf diagnose` decides on all manoeuvres.
     """
     from kempf.flows.jobs.diagnose.explain_stretch import explain_stretch
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     begin, over = utc_ns_of(start, "--from"), utc_ns_of(end, "--to")
     with progress_bar() as progress:

@@ -75,8 +75,8 @@ def tables(folder: Path, file_format: str, uri: str, as_json: bool) -> None:
 
     Files of an earlier call in FOLDER are replaced, each all at once.
     """
-    from kempf.warehouse.store import Warehouse
-    from kempf.warehouse.views import VIEWS
+    from kempf.warehouse.queries.views import VIEWS
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.new_file import replaced
 
     warehouse = Warehouse(uri)
@@ -140,7 +140,7 @@ def mcap_file(
     from kempf.flows.jobs.compare.compare_vessel import compare_vessel
     from kempf.flows.jobs.compare.measured_positions import measured_positions
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.export_mcap import about, to_mcap
     from kempf.workbench.new_file import require_new, write_new
 
@@ -188,7 +188,7 @@ def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | Non
     from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.flows.jobs.steering.ship_model import ship_of_set
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.export import linear
 
     warehouse = Warehouse(uri)
@@ -200,7 +200,7 @@ def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | Non
 def _text(form: str, set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.flows.jobs.state.out_of_date import said_of_sets
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.export import as_text
 
     warehouse = Warehouse(uri)

@@ -21,8 +21,8 @@ from kempf.workbench.terminal import print_json, print_note, print_paragraph, pr
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from kempf.warehouse.history import History
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.queries.history import History
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.changes import Examined
 
 
@@ -73,8 +73,9 @@ def command(
     Without --vessel, of the whole fleet.
     """
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse import history, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.queries import history
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import vessels
     from kempf.workbench.documents.changes import changes_document, examined
 
     _require_sense(file_format, output, figure, changes=changes, as_json=as_json)
@@ -190,7 +191,7 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
 
 def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> None:
     """Say of the current sets that are listed where predictions take other parameters than these."""
-    from kempf.warehouse import aliases, parameter_sets
+    from kempf.warehouse.tables import aliases, parameter_sets
     from kempf.workbench.parameter_set_table import print_by_likelihood
 
     for name, vessel_history in histories.items():
@@ -202,7 +203,7 @@ def _say_which_fit(warehouse: Warehouse, histories: Mapping[str, History]) -> No
 def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:
     """Print what people noted of the vessels, by that time."""
     from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
-    from kempf.warehouse import notes
+    from kempf.warehouse.tables import notes
     from kempf.workbench.cli.note import words_of
 
     for name in names:

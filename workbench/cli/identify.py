@@ -20,8 +20,8 @@ from kempf.workbench.terminal import print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, Request
-    from kempf.warehouse.parameter_set import ParameterSet
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @click.command("identify", cls=GivenOnce)
@@ -52,7 +52,7 @@ def command(
     from kempf.flows.jobs.identify.default_model import default_model_of
     from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
     from kempf.flows.jobs.identify.standing_model import Own
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.chosen_model import named_model, read_effect_files
 
     warehouse = Warehouse(uri)

@@ -40,8 +40,8 @@ def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool
     from kempf.flows.jobs.inbox.take_inbox import NeedsAPerson, take_inbox
     from kempf.flows.process.configuration import setting
     from kempf.schemas.errors import UsageError
-    from kempf.warehouse.source_folder import SourceFolder
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.sources.source_folder import SourceFolder
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.cli.ingest import print_outcomes
 
     place = folder or setting("inbox")

@@ -51,7 +51,7 @@ def command(
     """
     from kempf.flows.jobs.ingest.files import logs_in, read_profiles
     from kempf.flows.jobs.ingest.ingest_logs import ingest
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     paths, beside = logs_in(paths)
     profile = read_profiles(profiles or beside) if profiles or beside else None

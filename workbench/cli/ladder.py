@@ -25,7 +25,7 @@ FREE = ("free: fitted", "held out")
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to a vessel's current one, and how the error fell from one to the next."""
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.ladder import ladder_document
 
     warehouse = Warehouse(uri)

@@ -23,7 +23,7 @@ from kempf.workbench.terminal import one_line, print_json, print_note, print_tab
 
 if TYPE_CHECKING:
     from kempf.pipeline.ingest.decoded import LostStretch
-    from kempf.warehouse.logs import LogRow
+    from kempf.warehouse.tables.logs import LogRow
 
 
 #: Letters of a long file name that a table shows, first and last.
@@ -43,8 +43,8 @@ def command() -> None:
 def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
     from kempf.flows.jobs.state.out_of_date import said_of_logs
-    from kempf.warehouse import logs, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs, vessels
     from kempf.workbench.documents.logs import listed_logs
 
     warehouse = Warehouse(uri)
@@ -104,8 +104,8 @@ def _brief(channels: Any) -> str:
 @json_option
 def show(log_id: str, uri: str, as_json: bool) -> None:
     """Show one log: how it was read, and what the channel doctor found in it."""
-    from kempf.warehouse import logs
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs
     from kempf.workbench.cli.doctor import print_examination
     from kempf.workbench.documents.logs import log_document
 
@@ -141,8 +141,8 @@ def _damage(lost: Sequence[LostStretch]) -> str:
 @json_option
 def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
     """Show the records and values that were refused in one log, each with its reason and raw text."""
-    from kempf.warehouse import logs, readings
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs, readings
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
@@ -168,8 +168,8 @@ def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
 def quarantine(uri: str, as_json: bool) -> None:
     """List the files of inboxes that could not be placed or read, with the reason and what to do."""
     from kempf.flows.jobs.inbox.take_inbox import quarantine_json
-    from kempf.warehouse import inbox
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import inbox
 
     held = inbox.quarantined(Warehouse(uri))
     if as_json:
@@ -202,7 +202,7 @@ def release_file(
     """Ingest a file that is in quarantine, by its address or the end of it, as a log of the vessel that is named."""
     from kempf.flows.jobs.inbox.release_log import release
     from kempf.flows.jobs.ingest.files import read_profiles
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.cli.ingest import print_outcomes
 
     profile = read_profiles(profiles) if profiles else None
@@ -221,7 +221,7 @@ def release_file(
 def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
     """Leave a file that is in quarantine alone for good. The file itself is not touched."""
     from kempf.flows.jobs.inbox.release_log import dismiss
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     row = dismiss(Warehouse(uri), file, reason)
     if as_json:
@@ -241,8 +241,8 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
     from kempf.flows.jobs.corrections.affected_sets import of_logs
     from kempf.flows.jobs.corrections.remove_logs import remove
     from kempf.flows.jobs.state.out_of_date import command_for
-    from kempf.warehouse import logs
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
@@ -262,8 +262,8 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
     """Let a log that was removed count again, and its vessel where she was removed too."""
     from kempf.flows.jobs.corrections.remove_logs import restore
     from kempf.flows.jobs.state.out_of_date import command_for
-    from kempf.warehouse import vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import vessels
     from kempf.workbench.documents.logs import facts_of
 
     warehouse = Warehouse(uri)
@@ -290,8 +290,8 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
     from kempf.flows.jobs.corrections.affected_sets import of_logs
     from kempf.flows.jobs.corrections.remove_logs import move
     from kempf.schemas.errors import NotFound
-    from kempf.warehouse import logs
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs
     from kempf.workbench.documents.logs import facts_of
 
     warehouse = Warehouse(uri)

@@ -9,7 +9,7 @@ from kempf.workbench.manoeuvre_figures import FIGURES
 from kempf.workbench.numbers import number
 
 if TYPE_CHECKING:
-    from kempf.warehouse.segments import Segment
+    from kempf.warehouse.tables.segments import Segment
 
 _DIGITS = 3
 

@@ -21,7 +21,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     of kempf refuse the warehouse from then on.
     """
     from kempf.flows.jobs.repair.migrate_warehouse import migrate, planned
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     warehouse = Warehouse(uri)
     with progress_bar() as progress:

@@ -23,7 +23,7 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     intervals of the parameters most. What it is worth is worked out by the set's model with the ship's own instruments.
     """
     from kempf.flows.jobs.predict.next_trial import next_trial
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     with progress_bar() as progress:
         document = next_trial(Warehouse(uri), vessel, set_id, parameter, progress).as_json()

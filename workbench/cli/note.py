@@ -13,7 +13,7 @@ from kempf.workbench.instants import utc_ns_of
 from kempf.workbench.terminal import one_line, print_json
 
 if TYPE_CHECKING:
-    from kempf.warehouse.notes import Note
+    from kempf.warehouse.tables.notes import Note
 
 
 @click.command("note", cls=GivenOnce)
@@ -44,8 +44,8 @@ def command(
     """
     from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
     from kempf.flows.jobs.corrections.subject_of_note import subject_of
-    from kempf.warehouse import notes, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import notes, vessels
 
     warehouse = Warehouse(uri)
     warehouse.require()

@@ -37,7 +37,7 @@ def command() -> None:
 def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     """List parameter sets, of one vessel or of all."""
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.parameter_sets import listed_sets
 
     warehouse = Warehouse(uri)
@@ -64,7 +64,7 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.flows.jobs.identify.leg_fit import by_name
     from kempf.flows.jobs.state.out_of_date import said_of_sets
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.parameter_set_table import print_parameter_set
 
     warehouse = Warehouse(uri)
@@ -107,7 +107,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     """
     from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.flows.jobs.state.out_of_date import said_of_sets
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.compared_sets import compared_sets
     from kempf.workbench.parameter_set_table import print_by_likelihood
 
@@ -147,7 +147,7 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
     """
     from kempf.flows.jobs.identify.chosen_set import named_set
     from kempf.flows.jobs.state.out_of_date import said_of_sets
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.export import as_text
     from kempf.workbench.new_file import write_new
 
@@ -173,8 +173,8 @@ def alias(name: str, set_id: str, vessel: str | None, uri: str, as_json: bool) -
     Every command that takes the id of a set takes the name as well. Names move, sets never change.
     """
     from kempf.flows.jobs.identify.chosen_set import named_set
-    from kempf.warehouse import aliases
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import aliases
 
     warehouse = Warehouse(uri)
     parameter_set = named_set(warehouse, set_id, vessel)
@@ -210,7 +210,7 @@ def steering(
     """
     from kempf.flows.jobs.state.out_of_date import said_of_sets
     from kempf.flows.jobs.steering.steering_of_set import steering_of_set
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.ranked_warnings import show_warnings
 
     warehouse = Warehouse(uri)

@@ -73,7 +73,7 @@ def command(
     """
     from kempf.flows.jobs.predict.checked_prediction import predict_checked
     from kempf.flows.jobs.predict.compare_predicted import measured_beside, measured_kind, other_orders
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.prediction import prediction_document
 
     require_figures(figure, code="cannot_write")

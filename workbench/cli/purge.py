@@ -25,7 +25,7 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     """
     from kempf.flows.jobs.corrections.purge_logs import is_done, purge, what_goes
     from kempf.flows.jobs.state.out_of_date import command_for
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     warehouse = Warehouse(uri)
     goes = what_goes(warehouse, log_id, reason)

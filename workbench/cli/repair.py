@@ -25,9 +25,9 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     still wrong.
     """
     from kempf.flows.jobs.repair.repair_warehouse import repair
-    from kempf.warehouse.migrations.chain import MARKER_MENDED, repair_marker
-    from kempf.warehouse.store import Warehouse
-    from kempf.warehouse.verify import verify
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.upkeep.migrations.chain import MARKER_MENDED, repair_marker
+    from kempf.warehouse.upkeep.verify import verify
 
     warehouse = Warehouse(uri)
     repaired = repair_marker(warehouse)

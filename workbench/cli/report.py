@@ -32,7 +32,7 @@ def command(
     one that is not stored is made first, and stored.
     """
     from kempf.flows.jobs.identify.standing_model import Own
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
     from kempf.workbench.new_file import require_new, write_new
     from kempf.workbench.report.build import make_report

@@ -42,8 +42,8 @@ def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, u
     from kempf.flows.fleet.report import beyond, findings_in_words
     from kempf.flows.jobs.ingest.files import read_quality
     from kempf.schemas.quality import NO_LIMITS
-    from kempf.warehouse import vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import vessels
 
     limits = read_quality(quality) if quality else NO_LIMITS
     warehouse = Warehouse(uri)

@@ -16,7 +16,7 @@ from kempf.workbench.terminal import print_json, print_table, progress_bar
 if TYPE_CHECKING:
     from kempf.flows.jobs.reprocess.rerun_all import Verification
     from kempf.flows.jobs.reprocess.rerun_set import Rerun
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
 
 @click.command("rerun", cls=GivenOnce)
@@ -61,7 +61,7 @@ def command(
     stopped when it is called again.
     """
     from kempf.flows.jobs.identify.chosen_set import named_set
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     if unadopt:
         from kempf.workbench.cli.adopted import take_back

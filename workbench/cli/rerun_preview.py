@@ -17,8 +17,8 @@ from kempf.workbench.terminal import print_json, print_table, progress_bar
 if TYPE_CHECKING:
     from kempf.flows.jobs.reprocess.parameter_changes import Move
     from kempf.flows.jobs.reprocess.preview_code import VesselPreview
-    from kempf.warehouse.equivalents import Equivalent
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables.equivalents import Equivalent
 
 #: Lines for a person; --json has all.
 _SHOWN, _NAMED = 20, 3

@@ -16,7 +16,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import one_line, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
-    from kempf.warehouse.segments import Segment
+    from kempf.warehouse.tables.segments import Segment
 
 
 #: overshoots of a zigzag that a row has room for; the criteria are about the first two
@@ -49,7 +49,7 @@ for _one in correct_segments.COMMANDS:
 
 def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.state.out_of_date import said_of_logs
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 
     warehouse = Warehouse(uri)

@@ -58,7 +58,7 @@ def command(
     """
     from kempf.flows.jobs.steering.steer_vessel import SteerRequest, steer_vessel
     from kempf.pipeline.steering.course_keeping import LawSettings
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     require_figures(figure, code="cannot_write")
     request = SteerRequest(set_id, wrong, speed, LawSettings(method=method), leg_s=60.0 * minutes, seed=seed)

@@ -21,8 +21,8 @@ def command(uri: str, as_json: bool) -> None:
 
     Leaves with exit code 3 where something is. Nothing is changed.
     """
-    from kempf.warehouse.store import Warehouse
-    from kempf.warehouse.verify import verify
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.upkeep.verify import verify
 
     with progress_bar() as progress:
         problems = verify(Warehouse(uri), lambda what: progress(0, 1, what))

@@ -16,7 +16,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
 
 @click.group("vessels", cls=GivenOnceGroup)
@@ -29,8 +29,8 @@ def command() -> None:
 @json_option
 def list_vessels(uri: str, as_json: bool) -> None:
     """List the vessels with their logs, manoeuvres and parameter sets."""
-    from kempf.warehouse.store import Warehouse
-    from kempf.warehouse.vessel_counts import vessel_counts
+    from kempf.warehouse.queries.vessel_counts import vessel_counts
+    from kempf.warehouse.storage.store import Warehouse
 
     listed = vessel_counts(Warehouse(uri))
     if as_json:
@@ -49,7 +49,7 @@ def show(name: str, uri: str, as_json: bool) -> None:
     """Show a vessel's current profile, how often it changed, and which folders of the tables are hers."""
     import yaml
 
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.documents.vessel import vessel_document
 
     shown = vessel_document(Warehouse(uri), name)
@@ -70,7 +70,7 @@ def show(name: str, uri: str, as_json: bool) -> None:
 def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
     """Replace the vessel's current profile by another; `kempf reprocess` then applies it to her logs."""
     from kempf.flows.jobs.ingest.register_vessel import set_vessel
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     changed = set_vessel(Warehouse(uri), name, profiles)
     if as_json:
@@ -89,8 +89,8 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a vessel and all her logs count no longer. Nothing is deleted; `kempf history --as-of` still knows them."""
     from kempf.flows.jobs.corrections.affected_sets import of_logs
     from kempf.flows.jobs.corrections.remove_logs import remove_vessel
-    from kempf.warehouse import logs, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs, vessels
 
     warehouse = Warehouse(uri)
     vessels.require(warehouse, name)
@@ -111,7 +111,7 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
 
 def _stays(warehouse: Warehouse, name: str) -> str:
     """Return what of a vessel's sets does not go along, a phrase."""
-    from kempf.warehouse import aliases, notes
+    from kempf.warehouse.tables import aliases, notes
 
     stays = sorted(aliases.of_vessel(warehouse, name).keys() - {aliases.CURRENT, aliases.WITHDRAWN})
     noted = sum(note.subject == "set" for note in notes.of_vessel(warehouse, name))
@@ -131,8 +131,8 @@ def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: 
     from kempf.flows.jobs.corrections.affected_sets import of_logs
     from kempf.flows.jobs.corrections.remove_logs import rename_vessel
     from kempf.flows.jobs.state.out_of_date import command_for
-    from kempf.warehouse import logs, vessels
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
+    from kempf.warehouse.tables import logs, vessels
 
     warehouse = Warehouse(uri)
     vessels.require(warehouse, name)

@@ -30,7 +30,7 @@ def command(parameter: str, vessel: str, set_id: str | None, segment_id: str | N
     PARAMETER is one of the hull, such as a11, or of an effect, such as rudder_lag.tau; nothing is stored.
     """
     from kempf.flows.jobs.compare.what_if import what_if
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
 
     with progress_bar() as progress:
         answer = what_if(Warehouse(uri), vessel, parameter, set_id, segment_id, progress)

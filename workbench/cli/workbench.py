@@ -45,7 +45,7 @@ def command(
     The address that it prints lets one browser compute and change; others that find the pages can read. Ctrl-C ends it.
     """
     from kempf.schemas.errors import UsageError
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.web.serve import listening, serve, with_token
     from kempf.workbench.web.settings import LOOPBACK, Settings
 
@@ -75,7 +75,7 @@ def command(
 
 def _state_of(uri: str) -> Path:
     """Return the folder for a warehouse's jobs in the user's cache."""
-    from kempf.warehouse.canonical import sha256
+    from kempf.warehouse.storage.canonical import sha256
 
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     whole = uri if "://" in uri else str(Path(uri).resolve())

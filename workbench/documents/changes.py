@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.warehouse.history import Comparable, History
+from kempf.warehouse.queries.history import Comparable, History
 
 if TYPE_CHECKING:
     from kempf.pipeline.history.changes import Changes
@@ -55,7 +55,7 @@ def examined(kind: Comparable, occasion_h: float | None = None) -> Examined:
     Parameters
     ----------
     kind : Comparable
-        See `kempf.warehouse.history.comparable`.
+        See `kempf.warehouse.queries.history.comparable`.
     occasion_h : float, optional
         Trials begun within so many hours count as one, by default as `ChangeSettings` says.
     """

@@ -9,10 +9,10 @@ import numpy as np
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.nomoto import nomoto
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import vessels
-from kempf.warehouse.covariance import covariance_of
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue, compare, differences
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
+from kempf.warehouse.tables.covariance import covariance_of
+from kempf.warehouse.tables.parameter_set import ParameterSet, StoredValue, compare, differences
 
 #: powers of the length by which the six parameters have no dimension
 _POWERS = {"a11": 1, "a12": 0, "a21": 2, "a22": 1, "b1": 1, "b2": 2}
@@ -24,9 +24,9 @@ def compared_sets(warehouse: Warehouse, first: ParameterSet, second: ParameterSe
     Returns
     -------
     dict
-        ``first``, ``second``; ``parameters``, see `kempf.warehouse.parameter_set.compare`; ``nondimensional``, the same
-        of the hull's six without their dimension and of its K' = K L/V and T' = T V/L, by which ships of other sizes
-        are compared; None where a profile states no length, or a set has no hull.
+        ``first``, ``second``; ``parameters``, see `parameter_set.compare`; ``nondimensional``, the same of the hull's
+        six without their dimension and of its K' = K L/V and T' = T V/L, by which ships of other sizes are compared;
+        None where a profile states no length, or a set has no hull.
     """
     here, there = (
         without_dimension(parameter_set, _length_m(warehouse, parameter_set)) for parameter_set in (first, second)

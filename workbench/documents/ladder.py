@@ -7,8 +7,8 @@ from typing import Any
 from kempf.flows.jobs.identify.chosen_set import chosen_set
 from kempf.flows.jobs.identify.standing_model import current_id, rungs_to, standing
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import aliases, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, vessels
 
 
 def ladder_document(warehouse: Warehouse, vessel: str) -> list[dict[str, Any]]:

@@ -9,10 +9,10 @@ from typing import Any
 from kempf.flows.jobs.ingest.unreadable_stretches import as_json as lost_as_json
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse import examinations, logs, lost, vessels
-from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import examinations, logs, lost, vessels
+from kempf.warehouse.tables.examinations import StoredExamination
+from kempf.warehouse.tables.logs import LogRow
 
 
 def facts_of(row: LogRow) -> dict[str, Any]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.jobs.reprocess.vessel_quality import marks
-from kempf.warehouse import examinations, logs, segments
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import examinations, logs, segments
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True)

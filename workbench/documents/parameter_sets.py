@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse import aliases, parameter_sets, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, vessels
 
 
 def listed_sets(warehouse: Warehouse, vessel: str | None) -> list[dict[str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from kempf.warehouse.canonical import plain
+from kempf.warehouse.storage.canonical import plain
 
 
 def json_text(content: Any, *, ascii_only: bool = False) -> str:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.warehouse import vessels
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 
 def vessel_document(warehouse: Warehouse, name: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from kempf.schemas.enumeration import as_words
 from kempf.workbench.notebook.frames import as_html, frame_of
 
 if TYPE_CHECKING:
-    from kempf.warehouse.diagnoses import StoredDiagnosis
+    from kempf.warehouse.tables.diagnoses import StoredDiagnosis
 
 _RUNG = {
     **{"step": pl.Int64, "added": pl.String, "in_sample_error": pl.Float64, "held_out_error": pl.Float64},

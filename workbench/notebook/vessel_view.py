@@ -10,8 +10,8 @@ from typing import Any
 import polars as pl
 
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.notebook.comparison_view import ComparisonView
 from kempf.workbench.notebook.diagnosis_view import DiagnosisView, ladder_frame
 from kempf.workbench.notebook.frames import frame_of, with_instants
@@ -43,7 +43,7 @@ class VesselView:
 
     def segments(self) -> pl.DataFrame:
         """Return the manoeuvres in her logs that models are fitted to, one row each, in order of time."""
-        from kempf.warehouse import logs, segments
+        from kempf.warehouse.tables import logs, segments
 
         files = {row.ingest_id: row.file_name for row in logs.current(self.warehouse, self.name)}
         manoeuvres = segments.current(self.warehouse, self.name)
@@ -102,7 +102,7 @@ class VesselView:
 
     def parameter_sets(self) -> pl.DataFrame:
         """Return her parameter sets, one row each: id, start of the first zigzag, model, estimator, parent."""
-        from kempf.warehouse import parameter_sets
+        from kempf.warehouse.tables import parameter_sets
 
         return with_instants(parameter_sets.summaries(self.warehouse, self.name).drop("vessel"))
 
@@ -143,7 +143,7 @@ class VesselView:
         DataRejected
             ``nothing_to_compare``: this zigzag cannot be predicted; the message says why.
         """
-        from kempf.warehouse import segments
+        from kempf.warehouse.tables import segments
 
         segments.get(self.warehouse, segment_id)
         view = self.compare(set_id, horizon)
@@ -196,7 +196,7 @@ class VesselView:
         UsageError
             ``no_parameter``.
         """
-        from kempf.warehouse.history import of_vessel
+        from kempf.warehouse.queries.history import of_vessel
 
         return with_instants(of_vessel(self.warehouse, self.name, parameter).frame)
 

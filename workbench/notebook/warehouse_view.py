@@ -10,8 +10,8 @@ from pathlib import Path
 import polars as pl
 
 from kempf.flows.process.configuration import configured_warehouse
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 from kempf.workbench.notebook.frames import frame_of
 from kempf.workbench.notebook.vessel_view import VesselView
 
@@ -110,7 +110,7 @@ class WarehouseView:
         NotFound
             ``no_warehouse``.
         """
-        from kempf.warehouse.vessel_counts import vessel_counts
+        from kempf.warehouse.queries.vessel_counts import vessel_counts
 
         return frame_of(vessel_counts(self.warehouse), _VESSELS)
 

@@ -16,9 +16,10 @@ from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter
 from kempf.schemas.instants import iso_utc, minute
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, examinations, vessels
-from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import examinations, vessels
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis
 from kempf.workbench.effect_row import EffectRow
 from kempf.workbench.report.content import ReportContent, ShownManoeuvre
 from kempf.workbench.report.page import page

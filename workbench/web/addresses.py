@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import vessels
-from kempf.warehouse.keys import segment_of_address, vessel_key
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.keys import segment_of_address, vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 #: What an id looks like, by what it begins with; a log's is the SHA-256 of its bytes.
 _KINDS = (

@@ -18,7 +18,7 @@ from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Re
 
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.documents.text import json_text
 from kempf.workbench.web import static_routes
 from kempf.workbench.web.addresses import address_of, vessel_at

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.data.channel_cache import ChannelCache
 from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.uploads import Uploads

@@ -11,7 +11,7 @@ from pathlib import Path
 import uvicorn
 
 from kempf.schemas.errors import UsageError
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.app import create_app
 from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.settings import Settings

@@ -15,7 +15,7 @@ from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.requests import Request
 
 from kempf.schemas.errors import KempfError, UsageError
-from kempf.warehouse.whole_file import keep_newest, whole_file
+from kempf.warehouse.storage.whole_file import keep_newest, whole_file
 
 #: bytes of all files of a form together, files of a form, forms that may arrive at once
 MOST_BYTES, MOST_FILES, AT_ONCE = 256 * 2**20, 40, 2

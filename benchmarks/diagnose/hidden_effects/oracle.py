@@ -26,7 +26,7 @@ from kempf.pipeline.predict.free_run import free_run
 from kempf.schemas.effects import catalogue
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:

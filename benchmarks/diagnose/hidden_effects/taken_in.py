@@ -7,7 +7,7 @@ from pathlib import Path
 
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 def taken_in(files: Mapping[str, bytes], place: Path) -> Warehouse:

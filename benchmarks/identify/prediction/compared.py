@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 #: What is predicted of every ship: rudder of the circles, heading and rudder of the zigzags, deg.
 RUDDERS_DEG, ANGLES_DEG = (20.0, 35.0), ((10.0, 10.0), (20.0, 20.0))

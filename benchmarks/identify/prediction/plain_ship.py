@@ -38,7 +38,7 @@ from kempf.pipeline.simulate.manoeuvre import SteadyCourse, Step, TurningCircle,
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, TrialSettings, simulate_trial
 from kempf.schemas.errors import UsageError
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _HULLS = ("mariner", "container", "tanker", "ferry")
 _SEED = 20061

@@ -22,11 +22,11 @@ from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse import segments
-from kempf.warehouse.deduplicate import same
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries.deduplicate import same
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments
+from kempf.warehouse.tables.parameter_set import ParameterSet
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True, eq=False)

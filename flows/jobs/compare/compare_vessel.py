@@ -21,9 +21,9 @@ from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.run_residuals import RunResiduals, phases_s
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.units import SECOND_NS
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
+from kempf.warehouse.tables.segments import Segment
 
 #: what a comparison says of a manoeuvre, beside how it was predicted
 _SAILED = ("kind", "psi0_deg", "delta0_deg", "start", "end")

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.channels.series import Series
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.segments import Segment
 
 
 def measured_positions(warehouse: Warehouse, segments: Sequence[Segment]) -> dict[str, tuple[Series, Series]]:

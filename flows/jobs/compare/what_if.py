@@ -23,8 +23,8 @@ from kempf.pipeline.predict.free_run import free_run_of
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.schemas.motion_channel import MOTION
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: values tried to each side of the estimate, and standard errors between two of them
 _SIDE, _STEP = 4, 1.0

@@ -6,9 +6,10 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.warehouse import aliases, history, parameter_sets, segments
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, segments
+from kempf.warehouse.tables.logs import LogRow
 
 
 @dataclass(frozen=True)

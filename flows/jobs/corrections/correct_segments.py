@@ -20,10 +20,10 @@ from kempf.schemas.correction import Action, Bounds, Correction
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse import aliases, corrections, examinations, logs, segments
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, examinations, logs, segments
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from kempf.warehouse import logs, notes, segments
-from kempf.warehouse.notes import Note
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, notes, segments
+from kempf.warehouse.tables.notes import Note
 
 
 def notes_of_hers(warehouse: Warehouse, vessel: str) -> list[Note]:

@@ -10,13 +10,14 @@ from collections.abc import Mapping
 
 from kempf.flows.jobs.corrections.given_reason import require_reason
 from kempf.flows.jobs.corrections.remove_logs import held_or_removed, remove
-from kempf.warehouse import delta, diagnoses, logs, purges, raw
-from kempf.warehouse.erase import erase
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.purges import Purge
-from kempf.warehouse.scan import Where
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.scan import Where
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses, logs, purges, raw
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.purges import Purge
+from kempf.warehouse.upkeep.erase import erase
 
 #: Tables with what was measured or written down in a log, an ingest each.
 _OF_INGESTS = ("readings", "rejected", "lost", "examinations")

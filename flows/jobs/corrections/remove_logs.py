@@ -18,12 +18,12 @@ from kempf.flows.jobs.state.former_vessel import former_vessels, reason_of_move,
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, segments, vessels
-from kempf.warehouse.deposit import description
-from kempf.warehouse.equivalents import codes_of
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.notes import Note, Subject
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, logs, notes, purges, raw, segments, vessels
+from kempf.warehouse.tables.deposit import description
+from kempf.warehouse.tables.equivalents import codes_of
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.notes import Note, Subject
 
 
 def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Affected:

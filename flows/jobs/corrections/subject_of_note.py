@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import logs, parameter_sets, segments, vessels
-from kempf.warehouse.notes import Subject
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets, segments, vessels
+from kempf.warehouse.tables.notes import Subject
 
 
 def subject_of(

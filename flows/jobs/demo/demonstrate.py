@@ -23,7 +23,7 @@ from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.schemas.profile import VesselProfile
 from kempf.schemas.units import DAY_NS
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 #: Seed, first day, days between and headings of the three trial days: nothing hangs on them.
 _SEED, _FIRST_NS, _APART = 7, 1_746_252_000_000_000_000, 90

@@ -16,9 +16,9 @@ from kempf.flows.jobs.identify.standing_model import (
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: standard errors beyond which a prediction is worse, and part of the misfit:
 #: `kempf.pipeline.diagnose.improves_prediction`

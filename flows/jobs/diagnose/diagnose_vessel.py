@@ -21,9 +21,9 @@ from kempf.pipeline.diagnose.misfit import where_left
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.predict.run_residuals import PhaseInterval, phases_s
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import diagnoses
-from kempf.warehouse.diagnoses import StoredDiagnosis, diagnosis_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis, diagnosis_id
 
 
 @dataclass(frozen=True, eq=False)

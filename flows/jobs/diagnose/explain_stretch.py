@@ -18,8 +18,8 @@ from kempf.pipeline.diagnose.stretch_json import as_json
 from kempf.pipeline.estimate.pooled_fit import fit
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @dataclass(frozen=True, eq=False)

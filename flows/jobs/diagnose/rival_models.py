@@ -13,11 +13,12 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.enumeration import as_words, listed
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import code_version, diagnoses, parameter_sets
-from kempf.warehouse.canonical import canonical_json
-from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage.canonical import canonical_json
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses, parameter_sets
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: Verdicts that leave something.
 _LEFT = ("partly_explained", "unexplained")

@@ -12,9 +12,10 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.diagnose.settings import STANDARD
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import code_version, diagnoses
-from kempf.warehouse.diagnoses import StoredDiagnosis, diagnosis_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import diagnoses
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis, diagnosis_id
 
 
 def inputs_of_diagnosis(chosen: Chosen, spec: ModelSpec, own: Own) -> dict[str, Any]:

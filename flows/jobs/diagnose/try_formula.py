@@ -8,8 +8,8 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.standing_model import Own, standing_model
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import UsageError
-from kempf.warehouse.canonical import plain
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.canonical import plain
+from kempf.warehouse.storage.store import Warehouse
 
 #: letters that a formula may have
 LONGEST = 500

@@ -10,12 +10,12 @@ from kempf.flows.jobs.identify.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.ingest.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import logs, notes, segments
-from kempf.warehouse.deduplicate import once
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries.deduplicate import once
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, notes, segments
+from kempf.warehouse.tables.equivalents import code_of
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.segments import Segment
 
 #: so many manoeuvres with a speed through the water do without those that have none
 _ENOUGH = 2

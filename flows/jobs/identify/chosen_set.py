@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from kempf.flows.jobs.state.withdrawn_set import why_withdrawn
 from kempf.schemas.errors import NotFound, UsageError
-from kempf.warehouse import aliases, parameter_sets, vessels
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, vessels
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tuple[ParameterSet, str | None]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.surroundings import default_model
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 
 def default_model_of(warehouse: Warehouse, vessel: str) -> ModelSpec:

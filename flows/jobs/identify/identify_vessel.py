@@ -26,11 +26,13 @@ from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, parameter_sets, provenance, segments, vessels
+from kempf.warehouse.tables.equivalents import code_of
+from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.instrument_noise import lasting_noise
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
+from kempf.warehouse.tables.parameter_set import ParameterSet, StoredValue
 
 
 def lasting_noise_of(fit: PooledFit) -> tuple[StoredValue, ...]:

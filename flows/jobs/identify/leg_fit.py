@@ -9,7 +9,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.shooting.inflation import inflation
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def fitted_to_legs(parameter_set: ParameterSet) -> tuple[Float, Float, Float, float] | None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from kempf.pipeline.estimate.record.loads import loads
-from kempf.warehouse.notes import Sailed
+from kempf.warehouse.tables.notes import Sailed
 
 S = TypeVar("S", bound=Sailed)
 T = TypeVar("T", bound=Sailed)

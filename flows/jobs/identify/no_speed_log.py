@@ -21,9 +21,9 @@ from kempf.pipeline.estimate.result import Estimate
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.parameter_set import Inputs
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.parameter_set import Inputs
+from kempf.warehouse.tables.segments import Segment
 
 #: estimators that can estimate the speed; the others take the speed over ground along the bow, and say so
 CAN = ("ml",)

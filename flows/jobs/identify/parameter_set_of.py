@@ -9,8 +9,8 @@ from typing import Any
 from kempf.pipeline.estimate.result import Estimate, Value
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.parameter_set import Inputs, ParameterSet, parameter_set_id
-from kempf.warehouse.parameter_set import StoredValue as Stored
+from kempf.warehouse.tables.parameter_set import Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.tables.parameter_set import StoredValue as Stored
 
 
 def arm_of(spec: ModelSpec, profile: VesselProfile) -> float | None:

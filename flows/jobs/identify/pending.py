@@ -7,9 +7,9 @@ from contextlib import contextmanager
 
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: New sets of a vessel that wait for one commit: less than a minute of work, which is what a crash may cost.
 _SETS_A_COMMIT = 8

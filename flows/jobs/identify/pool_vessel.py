@@ -11,9 +11,9 @@ from kempf.flows.jobs.identify.standing_model import SINGLE
 from kempf.flows.jobs.identify.update_model import store_up_to_date
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import logs
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 def pool_vessel(

@@ -18,9 +18,9 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import read
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, parameter_sets, vessels
-from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, vessels
+from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 
 #: the estimator of these sets, its name in earlier versions where the model has effects, and that of single manoeuvres
 POOLED, WITH_EFFECTS, SINGLE = "ml-pooled", "ml-effects", "ml"
@@ -140,7 +140,7 @@ def effect_settings(spec: ModelSpec, own: Own) -> dict[str, Any]:
 
 
 def point(warehouse: Warehouse, model: ParameterSet, expected: str | EllipsisType | None = ...) -> None:
-    """Make a model the vessel's current one in place of a set; errors are those of `kempf.warehouse.aliases.point`."""
+    """Make a model the vessel's current one in place of a set; errors are those of `aliases.point`."""
     aliases.point(warehouse, model.vessel, model.parameter_set_id, expected=expected)
 
 

@@ -37,9 +37,9 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.instrument_noise import lasting_noise
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import UPDATES, Inputs, ParameterSet, Update, brought_forward
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, provenance, vessels
+from kempf.warehouse.tables.parameter_set import UPDATES, Inputs, ParameterSet, Update, brought_forward
 
 #: fewer manoeuvres are all fitted at once, and so are they when they have become so many times as many
 FEWEST, GROWN = 16, 1.5

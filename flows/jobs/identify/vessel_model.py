@@ -49,10 +49,10 @@ from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, N_HULL, NOISE_PARAMETERS, ModelSpec
 from kempf.schemas.units import as_read
-from kempf.warehouse import parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
-from kempf.warehouse.parameter_set import StoredValue as Stored
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, provenance, vessels
+from kempf.warehouse.tables.parameter_set import ParameterSet, parameter_set_id
+from kempf.warehouse.tables.parameter_set import StoredValue as Stored
 
 _STEP_S = 1.0
 #: standard errors from nothing within which an effect may as well not be there

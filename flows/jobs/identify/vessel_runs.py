@@ -19,9 +19,9 @@ from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import vessels
-from kempf.warehouse.parameter_set import Bounds
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
+from kempf.warehouse.tables.parameter_set import Bounds
 
 #: where the profile has no length; only the scale of non-dimensional coefficients depends on it
 LENGTH_M = 100.0

@@ -12,7 +12,7 @@ from kempf.flows.jobs.state.former_vessel import FormerVessel
 from kempf.flows.jobs.state.unknown_vessel import no_vessel
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.source_folder import SourceFile
+from kempf.warehouse.sources.source_folder import SourceFile
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from kempf.schemas.enumeration import counted
-from kempf.warehouse import inbox
-from kempf.warehouse.inbox import InboxFile
-from kempf.warehouse.source_folder import Listing
+from kempf.warehouse.sources.source_folder import Listing
+from kempf.warehouse.tables import inbox
+from kempf.warehouse.tables.inbox import InboxFile
 
 
 def remarks(root: str, listing: Listing, before: Mapping[str, InboxFile]) -> Iterator[str]:

@@ -8,10 +8,10 @@ from kempf.flows.jobs.inbox.take_inbox import Placed, take
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, settle_vessel
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import inbox
-from kempf.warehouse.inbox import InboxFile
-from kempf.warehouse.source_folder import SourceFolder
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.sources.source_folder import SourceFolder
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import inbox
+from kempf.warehouse.tables.inbox import InboxFile
 
 
 def release(

@@ -21,12 +21,13 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile, merge
-from kempf.warehouse import code_version, inbox, logs, purges, vessels
-from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.inbox import InboxFile
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.source_folder import SourceFile, SourceFolder
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.sources.source_folder import SourceFile, SourceFolder
+from kempf.warehouse.storage.canonical import canonical_json, sha256
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import inbox, logs, purges, vessels
+from kempf.warehouse.tables.inbox import InboxFile
+from kempf.warehouse.tables.logs import LogRow
 
 _log = logging.getLogger("kempf.jobs")
 

@@ -18,8 +18,8 @@ from kempf.pipeline.channels.doctor.verdict import as_json
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.channels.there_and_back import counted
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, readings, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, readings, vessels
 
 
 @dataclass(frozen=True, eq=False)

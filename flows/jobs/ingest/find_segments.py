@@ -26,7 +26,7 @@ from kempf.pipeline.segment.turning_circle import MeasuredCircle
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.segments import Segment, segment_id
+from kempf.warehouse.tables.segments import Segment, segment_id
 
 
 @dataclass(frozen=True)

@@ -29,13 +29,13 @@ from kempf.pipeline.ingest.readings import LogReadings, Tally
 from kempf.schemas.correction import Correction
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.profile import VesselProfile, overlay
-from kempf.warehouse import corrections, examinations, logs, lost, segments, vessels
-from kempf.warehouse.deposit import Delivery, Deposit, deposit, held
-from kempf.warehouse.equivalents import Codes, codes_of
-from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.keys import ingest_id, vessel_key
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.keys import ingest_id, vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import corrections, examinations, logs, lost, segments, vessels
+from kempf.warehouse.tables.deposit import Delivery, Deposit, deposit, held
+from kempf.warehouse.tables.equivalents import Codes, codes_of
+from kempf.warehouse.tables.examinations import StoredExamination
+from kempf.warehouse.tables.segments import Segment
 
 _log = logging.getLogger("kempf.jobs")
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from kempf.pipeline.channels.instruments import Instruments, from_readings
-from kempf.warehouse import readings
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import readings
 
 
 def channels_of(warehouse: Warehouse, ingest_id: str) -> Instruments:

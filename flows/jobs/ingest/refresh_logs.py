@@ -16,10 +16,10 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import corrections, logs, raw, vessels
-from kempf.warehouse.equivalents import codes_of
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import corrections, logs, raw, vessels
+from kempf.warehouse.tables.equivalents import codes_of
+from kempf.warehouse.tables.logs import LogRow
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest.ingest_logs import ReadLog

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 
 def set_vessel(warehouse: Warehouse, vessel: str, paths: Sequence[Path]) -> bool:

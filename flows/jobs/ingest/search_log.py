@@ -14,12 +14,12 @@ from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import corrections, examinations, readings, segments, vessels
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import corrections, examinations, readings, segments, vessels
+from kempf.warehouse.tables.equivalents import code_of
+from kempf.warehouse.tables.examinations import StoredExamination
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True, eq=False)

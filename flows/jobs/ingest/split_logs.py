@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from shlex import quote
 
-from kempf.warehouse.logs import LogRow
+from kempf.warehouse.tables.logs import LogRow
 
 #: Logs that begin so long after another one ends go on with it, ns; a recorder opens the next file at once.
 _PAUSE_NS = 2_000_000_000

@@ -15,7 +15,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.read import read_parts
 from kempf.pipeline.ingest.readings import LogReadings, Readings, Tally
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.store import not_writable
+from kempf.warehouse.storage.store import not_writable
 
 if TYPE_CHECKING:
     import polars as pl

@@ -34,10 +34,10 @@ from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.units import SECOND_NS
-from kempf.warehouse import notes
-from kempf.warehouse.parameter_set import Bounds
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import notes
+from kempf.warehouse.tables.parameter_set import Bounds
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True, eq=False)

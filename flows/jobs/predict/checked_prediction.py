@@ -18,7 +18,7 @@ from kempf.pipeline.manoeuvre.conditioned import OwnZigzag, conditioned
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags, held_against, missed, scatter
 from kempf.pipeline.manoeuvre.prediction import predict
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 _FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 

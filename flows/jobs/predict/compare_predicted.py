@@ -18,9 +18,9 @@ from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import segments
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import segments
+from kempf.warehouse.tables.segments import Segment
 
 _KINDS: dict[type, str] = {PredictedCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
 #: ships drawn for each measured manoeuvre

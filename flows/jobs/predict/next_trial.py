@@ -29,9 +29,9 @@ from kempf.pipeline.next_trial.planned_run import as_predicted, planned
 from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.covariance import covariance_of
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.covariance import covariance_of
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: heading and rudder of the zigzags that are looked at, deg: those of the standards, then what else gears do
 ANGLES_DEG = (

@@ -17,8 +17,8 @@ from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.prediction import predict
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 
 @dataclass(frozen=True, eq=False)

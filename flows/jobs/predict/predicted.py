@@ -15,7 +15,7 @@ from kempf.pipeline.manoeuvre.prediction import Prediction
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: what is taken of a channel that a manoeuvre in calm water has not
 _TAKEN = {

@@ -30,9 +30,9 @@ from kempf.pipeline.segment.particulars import Particulars
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, vessels
-from kempf.warehouse.parameter_set import Bounds, ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, vessels
+from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any
 
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.tables.segments import Segment
 
 #: Rudder angles that differ by less are the same order, deg.
 SAME_ORDER_DEG = 0.6

@@ -6,8 +6,8 @@ import shlex
 
 from kempf.flows.jobs.repair.repaired import Repaired
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import aliases, parameter_sets
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets
 
 #: tables whose rows come of the bytes of a log and of nothing else
 OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")

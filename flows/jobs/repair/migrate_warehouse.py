@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.process.progress import Progress, silent
-from kempf.warehouse.marker import LAYOUT
-from kempf.warehouse.migrations import chain
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.marker import LAYOUT
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.upkeep.migrations import chain
 
 
 @dataclass(frozen=True)

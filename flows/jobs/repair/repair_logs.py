@@ -13,12 +13,13 @@ from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import KempfError
 from kempf.schemas.instants import month_of
 from kempf.schemas.profile import parse
-from kempf.warehouse import corrections, delta, logs, lost, purges, raw, readings, vessels
-from kempf.warehouse.equivalents import code_of, codes_of
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import ingests_to_hold
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import corrections, logs, lost, purges, raw, readings, vessels
+from kempf.warehouse.tables.equivalents import code_of, codes_of
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.upkeep.verify import ingests_to_hold
 
 
 def missing_logs(warehouse: Warehouse, outcome: Repaired) -> list[str]:

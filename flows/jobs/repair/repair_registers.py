@@ -6,9 +6,9 @@ import shlex
 
 from kempf.flows.jobs.repair.repaired import Repaired
 from kempf.flows.jobs.state.former_vessel import moved_to, reason_of_rename
-from kempf.warehouse import logs, purges, raw, vessels
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import ingests_with_profile, kept_profile
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, purges, raw, vessels
+from kempf.warehouse.upkeep.verify import ingests_with_profile, kept_profile
 
 
 def put_receipts_back(warehouse: Warehouse, outcome: Repaired) -> None:

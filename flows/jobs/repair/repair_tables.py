@@ -7,9 +7,9 @@ from typing import Any
 
 from kempf.flows.jobs.repair.lost_rows import OF_LOGS, say_lost
 from kempf.flows.jobs.repair.repaired import Repaired
-from kempf.warehouse import delta, seals
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import ASIDE
+from kempf.warehouse.storage import delta, seals
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.upkeep.verify import ASIDE
 
 
 def repair_table(warehouse: Warehouse, folder: Path, name: str, outcome: Repaired) -> None:

@@ -19,11 +19,12 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, vessels
-from kempf.warehouse.deposit import describe_all
-from kempf.warehouse.migrations.chain import MARKER_MENDED, repair_marker
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import UNFINISHED, verify
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
+from kempf.warehouse.tables.deposit import describe_all
+from kempf.warehouse.upkeep.migrations.chain import MARKER_MENDED, repair_marker
+from kempf.warehouse.upkeep.verify import UNFINISHED, verify
 
 
 def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:

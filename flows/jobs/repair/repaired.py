@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass, field
 from typing import Any
 
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import UNFINISHED, Problem
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.upkeep.verify import UNFINISHED, Problem
 
 
 @dataclass

@@ -7,10 +7,11 @@ from collections.abc import Iterable, Sequence
 
 from kempf.flows.jobs.reprocess.preview_code import VesselPreview, standing_sets
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse import code_version, equivalents, logs, segments
-from kempf.warehouse.code_version import Stage
-from kempf.warehouse.equivalents import Equivalent
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.code.code_version import Stage
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import equivalents, logs, segments
+from kempf.warehouse.tables.equivalents import Equivalent
 
 
 def adopt_code(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[Equivalent]:

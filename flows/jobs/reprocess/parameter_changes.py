@@ -9,8 +9,8 @@ from typing import Any
 
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.agreement import content_digest
-from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
+from kempf.warehouse.tables.agreement import content_digest
+from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet, StoredValue
 
 
 @dataclass(frozen=True)

@@ -20,26 +20,17 @@ from kempf.flows.jobs.state.out_of_date import unsearched
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound
-from kempf.warehouse import (
-    aliases,
-    code_version,
-    corrections,
-    examinations,
-    history,
-    logs,
-    parameter_sets,
-    raw,
-    readings,
-    segments,
-)
-from kempf.warehouse import vessels as vessel_table
-from kempf.warehouse.canonical import canonical_json, plain
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.keys import ingest_id
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.canonical import canonical_json, plain
+from kempf.warehouse.storage.keys import ingest_id
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, examinations, logs, parameter_sets, raw, readings, segments
+from kempf.warehouse.tables import vessels as vessel_table
+from kempf.warehouse.tables.equivalents import code_of
+from kempf.warehouse.tables.examinations import StoredExamination
+from kempf.warehouse.tables.parameter_set import ParameterSet
+from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True)

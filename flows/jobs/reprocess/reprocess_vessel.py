@@ -30,9 +30,10 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, history, parameter_sets, segments
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, parameter_sets, segments
+from kempf.warehouse.tables.equivalents import code_of
 
 _log = logging.getLogger("kempf.jobs")
 

@@ -20,10 +20,12 @@ from kempf.flows.jobs.state.vessel_state import code_of_sets
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import code_version, delta, parameter_sets, purges, runs
-from kempf.warehouse import vessels as vessel_table
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, purges, runs
+from kempf.warehouse.tables import vessels as vessel_table
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 FLOW = "rerun"
 #: Besides the three verdicts: it could not be built again, and why; not written down, so that it is tried again.

@@ -18,11 +18,12 @@ from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
-from kempf.warehouse.agreement import Difference
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import agreement, logs, parameter_sets, raw, vessels
+from kempf.warehouse.tables.agreement import Difference
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet
 
 
 @dataclass(frozen=True)

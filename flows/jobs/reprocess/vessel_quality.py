@@ -10,9 +10,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.quality import Kind
-from kempf.warehouse import examinations, history, logs, parameter_sets, segments
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import examinations, logs, parameter_sets, segments
+from kempf.warehouse.tables.equivalents import code_of
 
 
 @dataclass(frozen=True)

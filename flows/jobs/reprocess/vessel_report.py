@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse import append_only, runs
-from kempf.warehouse.runs import FlowRun
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import append_only
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import runs
+from kempf.warehouse.tables.runs import FlowRun
 
 #: Codes of errors that come of the storage and may be gone at the next attempt.
 PASSING = ("warehouse_unreachable", "warehouse_busy", "warehouse_not_writable", "table_unreadable", "batch_lost")

@@ -7,8 +7,8 @@ import re
 from dataclasses import dataclass
 
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
 
 _NAME = r"""('(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"): """
 _RENAMED = re.compile(f"renamed to {_NAME}")

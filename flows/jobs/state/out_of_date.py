@@ -11,11 +11,12 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from kempf.flows.jobs.state.withdrawn_set import why_withdrawn
 from kempf.schemas.enumeration import counted
-from kempf.warehouse import aliases, corrections, examinations, history, logs, parameter_sets, vessels
-from kempf.warehouse.equivalents import code_of
-from kempf.warehouse.logs import LogRow
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.queries import history
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, corrections, examinations, logs, parameter_sets, vessels
+from kempf.warehouse.tables.equivalents import code_of
+from kempf.warehouse.tables.logs import LogRow
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 _OLDER = "with an older profile or another version of kempf"
 

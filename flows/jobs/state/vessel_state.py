@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING
 
 import kempf.warehouse as storage
 from kempf import flows
-from kempf.warehouse import code_version, delta
-from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.equivalents import Codes, codes_of
-from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.scan import Where
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.code import code_version
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.canonical import canonical_json, sha256
+from kempf.warehouse.storage.keys import vessel_key
+from kempf.warehouse.storage.scan import Where
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.equivalents import Codes, codes_of
 
 if TYPE_CHECKING:
     import polars as pl

@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import parameter_sets, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets, segments
 
 
 def why_withdrawn(warehouse: Warehouse, vessel: str, withdrawn: str) -> tuple[str, list[str]]:

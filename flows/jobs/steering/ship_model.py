@@ -19,10 +19,10 @@ from kempf.pipeline.steering.state_space import NoiseLevels, usual_levels
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import vessels
-from kempf.warehouse.covariance import covariance_of
-from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import vessels
+from kempf.warehouse.tables.covariance import covariance_of
+from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet, StoredValue
 
 #: noise level of a set by the field of `NoiseLevels` that it is
 _LEVELS = {

@@ -29,7 +29,7 @@ from kempf.pipeline.steering.track import (
     performance,
 )
 from kempf.schemas.errors import UsageError
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 
 @dataclass(frozen=True)

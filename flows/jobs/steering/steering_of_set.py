@@ -11,8 +11,8 @@ from kempf.pipeline.estimate.result import Value
 from kempf.pipeline.steering.motion import linear_hull
 from kempf.pipeline.steering.nomoto import Constant, Nomoto, nomoto
 from kempf.pipeline.steering.stability import Stability, stability
-from kempf.warehouse.parameter_set import by_name
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables.parameter_set import by_name
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from starlette.testclient import TestClient
 
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.app import create_app
 from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from kempf.workbench.web.jobs.queue import Queue

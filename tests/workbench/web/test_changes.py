@@ -12,8 +12,8 @@ import pytest
 from starlette.testclient import TestClient
 
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import notes, vessels
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import notes, vessels
 from kempf.workbench.web.draw.history import draw_history
 from kempf.workbench.web.jobs.engine_supervisor import EngineSupervisor
 from tests.history.made import step

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.app import create_app
 from kempf.workbench.web.guard import HEADERS
 from kempf.workbench.web.settings import Settings

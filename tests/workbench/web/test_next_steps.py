@@ -14,8 +14,8 @@ from starlette.testclient import TestClient
 from kempf.flows.jobs.corrections.correct_segments import plan_for
 from kempf.flows.jobs.identify import standing_model
 from kempf.flows.process.progress import silent
-from kempf.warehouse import aliases, segments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import aliases, segments
 from kempf.workbench.web.jobs.kinds import KINDS, Work
 from kempf.workbench.web.jobs.queue import Queue
 from tests.late import VESSEL, some_effects

@@ -17,8 +17,9 @@ from starlette.testclient import TestClient
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.units import SECOND_NS
-from kempf.warehouse import delta, logs, notes
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage import delta
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, notes
 from kempf.workbench import static_files
 from kempf.workbench.cli.entry import main
 from kempf.workbench.web.addresses import of_vessel

@@ -12,7 +12,7 @@ import pytest
 
 from kempf.flows.jobs.identify.standing_model import Own
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.report.build import make_report
 from tests.late import VESSEL, some_effects
 from tests.workbench.web.browsing import NEEDS_BROWSER, Server, accessible, opened, reach, served

@@ -7,7 +7,7 @@ from threading import Lock
 
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 
 #: bytes that all together may take
 MOST_BYTES = 512 * 2**20

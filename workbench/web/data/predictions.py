@@ -16,10 +16,10 @@ from kempf.flows.jobs.state.vessel_state import VesselState, fleet_state, respon
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
-from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
-from kempf.warehouse.whole_file import keep_newest, whole_file
+from kempf.warehouse.storage.canonical import canonical_json, sha256
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.storage.whole_file import keep_newest, whole_file
+from kempf.warehouse.tables.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare.compare_vessel import Comparison

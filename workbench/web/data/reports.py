@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from kempf.schemas.errors import NotFound
-from kempf.warehouse.canonical import sha256
-from kempf.warehouse.whole_file import keep_newest, whole_file
+from kempf.warehouse.storage.canonical import sha256
+from kempf.warehouse.storage.whole_file import keep_newest, whole_file
 from kempf.workbench.web.jobs.queue import DONE, Job
 
 #: reports kept: the ones made longest ago go first

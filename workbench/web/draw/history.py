@@ -9,7 +9,7 @@ from typing import Any
 from markupsafe import Markup
 
 from kempf.schemas.model_spec import HULL_PARAMETERS
-from kempf.warehouse.notes import Note
+from kempf.warehouse.tables.notes import Note
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
 from kempf.workbench.web.window import instant
@@ -26,7 +26,7 @@ def draw_history(
     Parameters
     ----------
     rows : sequence of mapping
-        Of `kempf.warehouse.history.History.rows`.
+        Of `kempf.warehouse.queries.history.History.rows`.
     examined : sequence of mapping, optional
         Of `kempf.workbench.documents.changes.Examined.as_json`: where a parameter moved its panel says so.
     noted : sequence of Note, optional
@@ -68,7 +68,7 @@ def shown_kind(rows: Sequence[Mapping[str, Any]]) -> tuple[str, str] | None:
     Parameters
     ----------
     rows : sequence of mapping
-        Of `kempf.warehouse.history.History.rows`.
+        Of `kempf.warehouse.queries.history.History.rows`.
     """
     kinds = Counter((row["model"], row["estimator"]) for row in _usable(rows))
     return max(kinds, key=lambda pair: (kinds[pair], pair)) if kinds else None

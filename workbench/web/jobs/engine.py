@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 
 from kempf.flows.process.wrap_error import wrapped
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.jobs.job_progress import JobProgress
 from kempf.workbench.web.jobs.kinds import KINDS, Work
 from kempf.workbench.web.jobs.queue import RUNNING, Job, Queue

@@ -7,7 +7,7 @@ import threading
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.web.jobs.engine import run
 
 _PAUSE_S, _LONGEST_S = 0.2, 10.0

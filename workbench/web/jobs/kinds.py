@@ -17,7 +17,7 @@ from urllib.parse import urlencode
 from kempf.flows.process.progress import Progress
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
@@ -259,7 +259,7 @@ def next_trial(work: Work) -> dict[str, Any]:
 
 def history_changes(work: Work) -> dict[str, Any]:
     """Put a vessel's parameters to the tests; the result is what `kempf history --changes --json` prints."""
-    from kempf.warehouse import history
+    from kempf.warehouse.queries import history
     from kempf.workbench.documents.changes import changes_document, examined
 
     vessel, as_of = work.arguments["vessel"], work.arguments["as_of"]

@@ -16,7 +16,7 @@ from typing import Any
 
 from kempf.flows.process.progress import Figures
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.storage.canonical import canonical_json, sha256
 
 QUEUED, RUNNING, DONE, FAILED, CANCELLED = "queued", "running", "done", "failed", "cancelled"
 #: states that a job leaves by itself

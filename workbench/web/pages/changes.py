@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from kempf.schemas.enumeration import as_words
-from kempf.warehouse import history, notes
+from kempf.warehouse.queries import history
+from kempf.warehouse.tables import notes
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

@@ -9,8 +9,8 @@ from kempf.flows.jobs.identify.chosen_set import named_set
 from kempf.flows.jobs.identify.leg_fit import by_name
 from kempf.flows.jobs.state.out_of_date import said_of_sets
 from kempf.flows.jobs.state.vessel_state import fleet_state
-from kempf.warehouse import aliases, vessels
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables import aliases, vessels
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.documents.compared_sets import compared_sets
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.data.predictions import free_horizon, kept, key_of

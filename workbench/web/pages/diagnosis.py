@@ -6,7 +6,7 @@ from typing import Any
 
 from kempf.flows.jobs.identify.standing_model import current_effects
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import aliases, diagnoses
+from kempf.warehouse.tables import aliases, diagnoses
 from kempf.workbench.rungs import first_model
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

@@ -6,7 +6,7 @@ from typing import Any
 
 from kempf.flows.jobs.identify.standing_model import current_effects
 from kempf.schemas.effects import catalogue, get
-from kempf.warehouse import diagnoses
+from kempf.warehouse.tables import diagnoses
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page
 

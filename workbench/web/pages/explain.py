@@ -7,7 +7,7 @@ from math import inf
 from typing import Any
 
 from kempf.schemas.effects import catalogue
-from kempf.warehouse import vessels
+from kempf.warehouse.tables import vessels
 from kempf.workbench.rungs import sized
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

@@ -10,9 +10,10 @@ from typing import Any
 from kempf.flows.jobs.reprocess.vessel_report import FLOW
 from kempf.schemas.instants import iso_utc
 from kempf.schemas.quality import in_words
-from kempf.warehouse import diagnoses, inbox, runs, views
-from kempf.warehouse.diagnoses import StoredDiagnosis
-from kempf.warehouse.vessel_counts import counted, vessel_counts
+from kempf.warehouse.queries import views
+from kempf.warehouse.queries.vessel_counts import counted, vessel_counts
+from kempf.warehouse.tables import diagnoses, inbox, runs
+from kempf.warehouse.tables.diagnoses import StoredDiagnosis
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.pages.page import Page
 

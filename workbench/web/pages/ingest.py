@@ -5,7 +5,7 @@ from __future__ import annotations
 from kempf.flows.jobs.ingest.ingest_logs import settle_vessel
 from kempf.flows.jobs.state.vessel_state import fleet_state
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import vessels
+from kempf.warehouse.tables import vessels
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.jobs.queue import Job
 from kempf.workbench.web.pages.page import Page

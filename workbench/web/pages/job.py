@@ -13,7 +13,7 @@ from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.correction import Action
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import segments, vessels
+from kempf.warehouse.tables import segments, vessels
 from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

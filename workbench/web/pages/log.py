@@ -7,7 +7,7 @@ from typing import Any
 from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.ingest.unreadable_stretches import as_json as lost_as_json
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse import logs, lost, segments
+from kempf.warehouse.tables import logs, lost, segments
 from kempf.workbench.documents.logs import log_document
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState

@@ -8,7 +8,7 @@ from typing import Any
 from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
 from kempf.schemas.enumeration import as_words
 from kempf.schemas.instants import iso_utc, minute
-from kempf.warehouse import aliases, logs, lost, segments
+from kempf.warehouse.tables import aliases, logs, lost, segments
 from kempf.workbench.charts.channels import derived
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel

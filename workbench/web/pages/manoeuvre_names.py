@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from kempf.schemas.instants import iso_utc, minute
-from kempf.warehouse import logs, segments
-from kempf.warehouse.segments import Segment
-from kempf.warehouse.store import Warehouse
+from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import logs, segments
+from kempf.warehouse.tables.segments import Segment
 from kempf.workbench.documents.manoeuvres import logs_begin_alike
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from kempf.flows.jobs.corrections.subject_of_note import subject_of
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import notes
+from kempf.warehouse.tables import notes
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.form_numbers import number_of
@@ -28,7 +28,7 @@ def write(app_state: AppState, form: Mapping[str, str]) -> str:
     Raises
     ------
     UsageError
-        ``note_too_long``, ``instant_unreadable``, ``number_unreadable``; and what `kempf.warehouse.notes.add` raises.
+        ``note_too_long``, ``instant_unreadable``, ``number_unreadable``; and what `notes.add` raises.
     """
     text = form.get("text", "")
     if len(text) > MOST:

@@ -7,7 +7,7 @@ from typing import Any
 from kempf.flows.jobs.identify.chosen_set import named_set
 from kempf.flows.jobs.identify.leg_fit import by_name
 from kempf.flows.jobs.state.out_of_date import said_of_sets
-from kempf.warehouse import history
+from kempf.warehouse.queries import history
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.correlation import draw_correlation

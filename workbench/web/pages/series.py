@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.schemas.motion_channel import MOTION
-from kempf.warehouse import logs, segments
+from kempf.warehouse.tables import logs, segments
 from kempf.workbench.charts.bins import Shown, reduced
 from kempf.workbench.charts.channels import LATERAL, entry
 from kempf.workbench.charts.frames import encoded

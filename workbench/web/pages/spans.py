@@ -7,8 +7,8 @@ from typing import Any
 
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.instants import iso_utc
-from kempf.warehouse.notes import Note
-from kempf.warehouse.segments import Segment
+from kempf.warehouse.tables.notes import Note
+from kempf.warehouse.tables.segments import Segment
 
 #: letters of a note that a chart has room for
 _MOST = 40

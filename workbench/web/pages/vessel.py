@@ -7,7 +7,8 @@ from typing import Any
 from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.identify.standing_model import POOLED, WITH_EFFECTS
 from kempf.flows.jobs.state.out_of_date import said_of_vessel
-from kempf.warehouse import aliases, diagnoses, history
+from kempf.warehouse.queries import history
+from kempf.warehouse.tables import aliases, diagnoses
 from kempf.workbench.documents.logs import listed_logs
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike
 from kempf.workbench.documents.parameter_sets import listed_sets

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from kempf.flows.jobs.identify.chosen_set import chosen_set
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.what_if import draw_what_if

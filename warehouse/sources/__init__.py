@@ -1,0 +1,1 @@
+"""Folders and buckets that logs arrive in."""

@@ -1,0 +1,1 @@
+"""How tables and files are kept in a folder or bucket."""

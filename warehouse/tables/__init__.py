@@ -1,0 +1,1 @@
+"""What is kept, a table or kind of file each."""

@@ -1,0 +1,1 @@
+"""Tables made smaller, brought to a later layout, and checked."""
