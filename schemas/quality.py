@@ -36,7 +36,7 @@ class Limits(Frozen):
     channels: int | None = Field(default=None, ge=0)
 
 
-class Quality(Limits):
+class FleetLimits(Limits):
     """The limits of the fleet, and of vessels that differ; what a vessel does not name is as for the fleet."""
 
     vessels: dict[str, Limits] = Field(default_factory=dict)
@@ -56,10 +56,10 @@ def in_words(kind: str, count: int) -> str:
 
 
 #: any number of findings is allowed
-NO_LIMITS = Quality()
+NO_LIMITS = FleetLimits()
 
 
-def parse(content: Any, where: str) -> Quality:
+def parse(content: Any, where: str) -> FleetLimits:
     """Return the limits that the content of a file states.
 
     Parameters
@@ -73,7 +73,7 @@ def parse(content: Any, where: str) -> Quality:
         ``quality_invalid``: every fault is named with its place.
     """
     try:
-        return Quality.model_validate({} if content is None else content)
+        return FleetLimits.model_validate({} if content is None else content)
     except ValidationError as error:
         faults = faults_of(error, "file", content)
         raise UsageError(

@@ -19,7 +19,7 @@ BY_LEGS = "free runs (median) and sizes: with the parameters fitted to legs, whi
 
 
 @dataclass(frozen=True)
-class Errors:
+class RungErrors:
     """Errors over manoeuvres, percent of the motion; None where there are none, NaN where one diverges."""
 
     fitted: float | None
@@ -28,7 +28,7 @@ class Errors:
 
 
 @dataclass(frozen=True)
-class Size:
+class EffectSize:
     """A parameter of an effect."""
 
     name: str
@@ -50,12 +50,12 @@ class Rung:
     #: Whether free runs and sizes are with the parameters fitted to legs.
     by_legs: bool
     #: Means.
-    leg: Errors
+    leg: RungErrors
     #: Means; with the parameters fitted to legs medians, as those of a ship that keeps no course may run off. Left out
     #: is None.
-    free: Errors
+    free: RungErrors
     #: Of the effect that was added.
-    sizes: tuple[Size, ...]
+    sizes: tuple[EffectSize, ...]
     #: How many free runs leave the measured course altogether, and of how many, where they are by legs.
     off: tuple[int, int] = (0, 0)
 
@@ -135,12 +135,12 @@ def _off(rung: Mapping[str, Any]) -> tuple[int, int]:
     return sum(not error < 100.0 * LEFT_THE_COURSE for error in errors), len(errors)
 
 
-def _leg(rung: Mapping[str, Any]) -> Errors:
+def _leg(rung: Mapping[str, Any]) -> RungErrors:
     ahead = rung.get("one_leg_ahead") or {}
-    return Errors(*(_mean((ahead.get(f"{s}_percent") or {}).values()) for s in ("fitted", "left_out", "held_out")))
+    return RungErrors(*(_mean((ahead.get(f"{s}_percent") or {}).values()) for s in ("fitted", "left_out", "held_out")))
 
 
-def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
+def _free(rung: Mapping[str, Any], *, by_legs: bool) -> RungErrors:
     if by_legs and rung.get("free_run_fitted_to_legs"):
         legs = by_manoeuvre(rung)
         own = ([legs[name] for name in rung[key] if name in legs] for key in ("in_sample", "held_out"))
@@ -150,7 +150,7 @@ def _free(rung: Mapping[str, Any], *, by_legs: bool) -> Errors:
             _in_percent(rung[error]) if rung[key] else None
             for error, key in (("in_sample_error", "in_sample"), ("held_out_error", "held_out"))
         )
-    return Errors(fitted, None, held)
+    return RungErrors(fitted, None, held)
 
 
 def _mean(errors: Iterable[float | None]) -> float | None:
@@ -162,7 +162,7 @@ def _in_percent(error: float | None) -> float:
     return nan if error is None else 100.0 * error
 
 
-def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[Size, ...]:
+def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[EffectSize, ...]:
     from kempf.pipeline.shooting.inflation import inflation
 
     ahead = rung.get("one_leg_ahead") or {}
@@ -172,7 +172,7 @@ def _sizes(rung: Mapping[str, Any], *, by_legs: bool) -> tuple[Size, ...]:
         own = {name: {**ahead["parameters"][name], "unit": one.get("unit")} for name, one in own.items()}
         factor = inflation(ahead.get("fitted_misfit"), ahead.get("left_out_misfit"))
     return tuple(
-        Size(
+        EffectSize(
             name.partition(".")[2],
             one["value"],
             None if one["std"] is None else factor * one["std"],

@@ -26,7 +26,7 @@ from kempf.flows.jobs.identify.pool_vessel import pool_vessel
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.predict import as_sailed
 from kempf.flows.jobs.predict.checked_prediction import CheckedPredictions
-from kempf.flows.jobs.predict.compare_predicted import Beside, measured_beside
+from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, measured_beside
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.hulls import SimulatedHull
@@ -99,7 +99,7 @@ def compared(number: int) -> tuple[list[Circle], tuple[int, int]]:
     return found, own
 
 
-def _held(figures: Sequence[Beside], wind: str) -> Iterator[Circle]:
+def _held(figures: Sequence[ComparedFigure], wind: str) -> Iterator[Circle]:
     for one in figures:
         if one.inside is not None:
             yield Circle(one.name, wind, one.inside, bool(one.agrees))

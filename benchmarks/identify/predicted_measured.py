@@ -27,10 +27,10 @@ from kempf.flows.jobs.identify.vessel_model import store_model
 from kempf.flows.jobs.ingest.files import read_model
 from kempf.flows.jobs.predict.as_sailed import as_sailed
 from kempf.flows.jobs.predict.checked_prediction import predict_checked
-from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre, beside, measured_beside
+from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre, beside, measured_beside
 from kempf.flows.jobs.predict.predict_request import PredictRequest
-from kempf.flows.jobs.predict.predicted import Predicted
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.storage.store import Warehouse
@@ -95,7 +95,7 @@ def zigzags(warehouse: Warehouse, vessel: str, source: Source, *, others: bool) 
     assert checked is not None
     every = [s for s in segments.current(warehouse, vessel) if s.kind == "zigzag"]
     pairs = [
-        (s, Zigzag(np.deg2rad(s.psi0_deg), np.deg2rad(s.delta0_deg), overshoots=2))
+        (s, PredictedZigzag(np.deg2rad(s.psi0_deg), np.deg2rad(s.delta0_deg), overshoots=2))
         for s in sorted(every, key=lambda s: (s.psi0_deg, s.delta0_deg, s.first_side))
     ]
     sailed = as_sailed(warehouse, made, pairs)
@@ -163,14 +163,14 @@ def _calm_circle(warehouse: Warehouse, vessel: str, source: Source, *, others: b
         "",
     ]
 
-    def elsewhere(side: Any, rudder_rate_deg_s: float) -> Predicted:
+    def elsewhere(side: Any, rudder_rate_deg_s: float) -> PredictedManoeuvre:
         request = PredictRequest("turning-circle", source.set_id, side=side, rudder_rate_deg_s=rudder_rate_deg_s)
         return predict_checked(warehouse, vessel, request)
 
     return [*lines, *peers.circles_beside(elsewhere)] if others else lines
 
 
-def _cell(figure: Beside | None) -> str:
+def _cell(figure: ComparedFigure | None) -> str:
     if figure is None:
         return ""
     one = figure.predicted

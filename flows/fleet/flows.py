@@ -258,7 +258,7 @@ def reprocess(
     changed_only : bool, optional
         False also verifies every kept parameter set from the raw bytes.
     quality : str, optional
-        File of limits, `kempf.schemas.quality.Quality`; without one any number of findings is allowed.
+        File of limits, `kempf.schemas.quality.FleetLimits`; without one any number of findings is allowed.
 
     Returns
     -------

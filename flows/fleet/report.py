@@ -8,7 +8,7 @@ from typing import Any
 
 from kempf.schemas.enumeration import counted
 from kempf.schemas.errors import DataRejected
-from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality, in_words
+from kempf.schemas.quality import FINDINGS, NO_LIMITS, FleetLimits, in_words
 from kempf.warehouse.storage.keys import segment_of_address
 
 #: Rows of a table that a page can still show; of a larger fleet those where nothing happened are left out.
@@ -28,7 +28,7 @@ class VesselsFailed(DataRejected):
         One a vessel, those that did not fail among them; kept in ``details``.
     """
 
-    def __init__(self, reports: Reports, quality: Quality) -> None:
+    def __init__(self, reports: Reports, quality: FleetLimits) -> None:
         super().__init__(
             "vessels_failed",
             f"{sentence(reports, quality)}.",
@@ -42,12 +42,12 @@ def alarming(report: Mapping[str, Any]) -> bool:
     return any(not (failure["lasting"] and failure["known"]) for failure in report["failures"])
 
 
-def beyond(report: Mapping[str, Any], quality: Quality) -> list[str]:
+def beyond(report: Mapping[str, Any], quality: FleetLimits) -> list[str]:
     """Return what a vessel has more of than the limits allow, such as ``2 logs without a manoeuvre to fit``."""
     return [in_words(kind, count) for kind, count in _over(report, quality).items()]
 
 
-def _over(report: Mapping[str, Any], quality: Quality) -> dict[str, int]:
+def _over(report: Mapping[str, Any], quality: FleetLimits) -> dict[str, int]:
     """Return how many findings a vessel has of each kind of which she has more than the limits allow."""
     limits = {kind: quality.limit(str(report["vessel"]), kind) for kind in FINDINGS}
     counts = _counts([report])
@@ -62,12 +62,12 @@ def _in_words(counts: Mapping[str, int]) -> str:
     return ", ".join(in_words(kind, counts[kind]) for kind in FINDINGS if counts[kind])
 
 
-def needs_a_person(report: Mapping[str, Any], quality: Quality) -> bool:
+def needs_a_person(report: Mapping[str, Any], quality: FleetLimits) -> bool:
     """Return whether a run is not to end as Completed for the sake of a vessel."""
     return alarming(report) or bool(beyond(report, quality))
 
 
-def sentence(reports: Reports, quality: Quality = NO_LIMITS) -> str:
+def sentence(reports: Reports, quality: FleetLimits = NO_LIMITS) -> str:
     """Return the outcome in one sentence.
 
     Examples
@@ -105,7 +105,7 @@ def findings_in_words(report: Mapping[str, Any]) -> str:
     return _in_words(_counts([report]))
 
 
-def markdown(reports: Reports, quality: Quality = NO_LIMITS, pages: str | None = None) -> str:
+def markdown(reports: Reports, quality: FleetLimits = NO_LIMITS, pages: str | None = None) -> str:
     """Return the summary of a run as Markdown: what was done, who failed with what, what is wrong with the models.
 
     Parameters
@@ -138,7 +138,7 @@ def markdown(reports: Reports, quality: Quality = NO_LIMITS, pages: str | None =
     return "\n".join(lines + _quality(reports, quality, pages))
 
 
-def _quality(reports: Reports, quality: Quality, pages: str | None) -> list[str]:
+def _quality(reports: Reports, quality: FleetLimits, pages: str | None) -> list[str]:
     """Return what is wrong with logs and models: how much in the fleet, and each of those who are beyond the limits."""
     totals = _counts(reports)
     if not totals:

@@ -20,7 +20,7 @@ DEFAULT_WAREHOUSE = "kempf-data"
 
 
 @dataclass(frozen=True)
-class Setting:
+class SettingInForce:
     """One setting as it is in force."""
 
     name: str
@@ -70,21 +70,21 @@ def log_level() -> str | None:
     return level.value
 
 
-def in_force(name: str) -> Setting:
+def in_force(name: str) -> SettingInForce:
     """Return a setting with what sets it; the parameters and errors are those of `setting`."""
     variable = VARIABLES[name]
     if os.environ.get(variable):
-        return Setting(name, os.environ[variable], variable)
+        return SettingInForce(name, os.environ[variable], variable)
     path = file_of()
     if path is None:
-        return Setting(name, None, None)
+        return SettingInForce(name, None, None)
     from kempf.schemas.configuration import value_of
 
     value = value_of(_read(path), name)
-    return Setting(name, value, str(path) if value is not None else None)
+    return SettingInForce(name, value, str(path) if value is not None else None)
 
 
-def every() -> list[Setting]:
+def every() -> list[SettingInForce]:
     """Return all settings; errors are those of `setting`."""
     return [in_force(name) for name in VARIABLES]
 

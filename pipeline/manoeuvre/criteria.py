@@ -12,7 +12,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.covered import Beyond
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.segment.imo import overshoot_limits
 from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
 from kempf.schemas.enumeration import listed
@@ -95,7 +95,7 @@ def _criteria(
             ("advance", "advance_m", lengths(ADVANCE), "m", note),
             ("tactical diameter", "tactical_diameter_m", lengths(TACTICAL_DIAMETER), "m", note),
         ]
-    if not isinstance(manoeuvre, Zigzag):
+    if not isinstance(manoeuvre, PredictedZigzag):
         return []
     angles = tuple(round(float(np.degrees(a)), 6) for a in (manoeuvre.heading_rad, manoeuvre.rudder_rad))
     if angles == (10.0, 10.0):

@@ -24,7 +24,7 @@ _NOTHING = 1e-5
 
 
 @dataclass(frozen=True)
-class PullOut:
+class PredictedPullOut:
     """Out of a turn to a side."""
 
     #: Magnitude, of the turn.

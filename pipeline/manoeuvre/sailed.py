@@ -10,7 +10,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre import motion
-from kempf.pipeline.manoeuvre.ship import Ship, Track
+from kempf.pipeline.manoeuvre.ship import SailedTrack, Ship
 
 #: rows that a curve is thinned to
 _DRAWN = 400
@@ -53,7 +53,7 @@ class Manoeuvre(Protocol):
         """Sail it; None where she is no ship: she runs away, or never comes to where the manoeuvre ends."""
 
 
-def reach_of(track: Track, length_m: float) -> Reach:
+def reach_of(track: SailedTrack, length_m: float) -> Reach:
     """Return how far out a track goes."""
     forward, lateral = track.column(motion.FORWARD), track.column(motion.LATERAL)
     return Reach(

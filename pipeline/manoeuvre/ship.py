@@ -28,7 +28,7 @@ class Start:
     rudder_rad: float | None = None
 
     @classmethod
-    def at_end_of(cls, track: Track) -> Start:
+    def at_end_of(cls, track: SailedTrack) -> Start:
         """Return the motion in which a manoeuvre ended, to go on from."""
         return cls(*track.rows[-1, [motion.FORWARD, motion.LATERAL, motion.RATE, motion.RUDDER]].tolist())
 
@@ -126,7 +126,7 @@ class Ship:
         hull = np.ascontiguousarray(self.hull[:, None])
         return self.numbers, hull, np.ascontiguousarray(self.effects), float(w.day), w.model.table, w.model.extra
 
-    def sail(self, phases: Float, *, steps_a_length: float = STEPS_A_LENGTH) -> Track:
+    def sail(self, phases: Float, *, steps_a_length: float = STEPS_A_LENGTH) -> SailedTrack:
         """Sail a manoeuvre; see `kempf.pipeline.manoeuvre.motion.sail`.
 
         Parameters
@@ -144,7 +144,7 @@ class Ship:
             *(*self._shared(), kinds, sizes, self.waters.start.vector(), np.ascontiguousarray(self.waters.air)),
             *(np.ascontiguousarray(phases, dtype=np.float64), step, track, ends),
         )
-        return Track(track[:rows].copy(), ends, int(how))
+        return SailedTrack(track[:rows].copy(), ends, int(how))
 
     def rudder_for(self, yaw_rate_rad_s: float, start: Float | None = None) -> Balance | None:
         """Return the steady turn at a yaw rate, None where there is none.
@@ -201,7 +201,7 @@ class Balance:
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class SailedTrack:
     """A manoeuvre as it was sailed."""
 
     #: Shape (n, 9). Columns of `kempf.pipeline.manoeuvre.motion`.

@@ -24,7 +24,7 @@ _RUDDER_STEP, _TORN = radians(0.25), 0.1
 
 
 @dataclass(frozen=True)
-class Spiral:
+class PredictedSpiral:
     """From hard over to hard over."""
 
     #: Magnitude of the outermost rudder angle.

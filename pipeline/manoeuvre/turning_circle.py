@@ -14,7 +14,7 @@ import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Reach, Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Balance, Ship, Start, Track
+from kempf.pipeline.manoeuvre.ship import Balance, SailedTrack, Ship, Start
 from kempf.pipeline.segment.turning_figures import turning_figures
 
 #: a ship that takes longer for a whole circle, in ship lengths on the approach, does not turn
@@ -60,14 +60,14 @@ class PredictedCircle:
         return Sailed(named, curve, reach)
 
 
-def turned(ship: Ship, side: int, rudder_rad: float, turn_rad: float | None = None) -> Track | None:
+def turned(ship: Ship, side: int, rudder_rad: float, turn_rad: float | None = None) -> SailedTrack | None:
     """Return a turn by an angle, rad, one and a half by default; None where she runs away or never comes round."""
     angle, longest = 3.0 * pi if turn_rad is None else turn_rad, LONGEST * ship.waters.own_time_s
     track = ship.sail(np.array([[side * rudder_rad, side, side * angle, longest]]))
     return track if track.how == motion.SAILED else None
 
 
-def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance | None:
+def settled(ship: Ship, side: int, rudder_rad: float, track: SailedTrack) -> Balance | None:
     """Return the steady turn that one comes to; None where there is none beside the end of it."""
     order = side * rudder_rad
     balance = _beside(ship, order, track)
@@ -78,7 +78,7 @@ def settled(ship: Ship, side: int, rudder_rad: float, track: Track) -> Balance |
     return _beside(ship, order, on) if on.how == motion.SAILED else None
 
 
-def _beside(ship: Ship, order_rad: float, track: Track) -> Balance | None:
+def _beside(ship: Ship, order_rad: float, track: SailedTrack) -> Balance | None:
     """Return the steady turn beside the motion at the end of a track."""
     start = np.zeros(2 + ship.waters.model.extra)
     start[0], start[1] = track.rows[-1, motion.LATERAL], track.rows[-1, motion.RATE]
@@ -86,7 +86,7 @@ def _beside(ship: Ship, order_rad: float, track: Track) -> Balance | None:
     return balance if balance is not None and abs(balance.yaw_rate_rad_s / start[1] - 1.0) < _BESIDE else None
 
 
-def _steady(balance: Balance | None, track: Track) -> dict[str, float]:
+def _steady(balance: Balance | None, track: SailedTrack) -> dict[str, float]:
     """Return the steady figures of the turn that she comes to; NaN where she comes to none."""
     if balance is None:
         return dict.fromkeys(_STEADY, nan)

@@ -13,14 +13,14 @@ import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Ship, Track
+from kempf.pipeline.manoeuvre.ship import SailedTrack, Ship
 
 #: a leg that takes longer, in ship lengths on the approach, does not end
 LONGEST_LEG = 150.0
 
 
 @dataclass(frozen=True)
-class Zigzag:
+class PredictedZigzag:
     """A psi/delta zigzag."""
 
     #: heading_rad, rudder_rad: Nominal heading change and rudder.
@@ -33,7 +33,7 @@ class Zigzag:
     switched_rad: tuple[float, ...] = ()
     name: str = "zigzag"
 
-    def track(self, ship: Ship) -> Track:
+    def track(self, ship: Ship) -> SailedTrack:
         """Return the track, of as many legs as there are overshoots and one more."""
         longest, legs = LONGEST_LEG * ship.waters.own_time_s, self.overshoots + 1
         targets = [*self.switched_rad, *[self.heading_rad] * legs][:legs]

@@ -12,7 +12,7 @@ from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.grid_run import GridRun, current_row
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.manoeuvre import motion
-from kempf.pipeline.manoeuvre.ship import Ship, Track
+from kempf.pipeline.manoeuvre.ship import SailedTrack, Ship
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.pipeline.model.rudder_line import RudderLine
 from kempf.schemas.model_spec import ModelSpec
@@ -28,7 +28,7 @@ _CHANNEL = {symbol: 2 + k for k, symbol in enumerate(CHANNEL_SYMBOLS)}
 _OF_RUN = 2 + len(CHANNEL_SYMBOLS)
 
 
-def planned(track: Track, ship: Ship, like: GridRun, spec: ModelSpec) -> GridRun:
+def planned(track: SailedTrack, ship: Ship, like: GridRun, spec: ModelSpec) -> GridRun:
     """Return a manoeuvre as it would be read, with nothing measured yet: every measurement that would be made is 0.
 
     In calm, deep water, as `kempf.pipeline.manoeuvre` sails; channels, rates and noise are those of a run that was

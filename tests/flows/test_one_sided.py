@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre
+from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre
 from kempf.flows.jobs.predict.one_sided import one_sided
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
 def manoeuvre(number: int, *figures: tuple[str, float, float | None]) -> MeasuredManoeuvre:
     """One that was sailed to starboard and to port in turn: name, measured and predicted of each figure."""
-    every = tuple(Beside(name, there, None, None, within(value, 0.05)) for name, there, value in figures)
+    every = tuple(ComparedFigure(name, there, None, None, within(value, 0.05)) for name, there, value in figures)
     return MeasuredManoeuvre(f"seg-{number}", "starboard" if number % 2 else "port", 8.0, 0.0, 0.0, "held_out", every)
 
 

@@ -26,7 +26,7 @@ from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
@@ -157,7 +157,7 @@ def test_a_prediction_lays_out_the_manoeuvres_of_its_set_once_and_others_alike(
 
         monkeypatch.setattr(as_sailed_job, "assembled", laid_out)
         monkeypatch.setattr(as_sailed_job, "RunFilter", filtered)
-        pairs = [(s, Zigzag(np.radians(20.0), np.radians(20.0), overshoots=2)) for s in every]
+        pairs = [(s, PredictedZigzag(np.radians(20.0), np.radians(20.0), overshoots=2)) for s in every]
         sailed = as_sailed(days, made, pairs)
         monkeypatch.undo()
         assert {one.segment.segment_id for one in sailed if one.sample == "fitted"} == own

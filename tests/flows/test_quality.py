@@ -17,7 +17,7 @@ from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.vessel_quality import marks, quality_of
 from kempf.schemas.errors import UsageError
-from kempf.schemas.quality import FINDINGS, NO_LIMITS, Limits, Quality
+from kempf.schemas.quality import FINDINGS, NO_LIMITS, FleetLimits, Limits
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import logs, parameter_sets, segments
 from kempf.warehouse.tables.parameter_set import ParameterSet
@@ -113,7 +113,7 @@ def report(vessel: str = "a", **counts: int) -> dict[str, Any]:
 
 
 def test_limits_decide_and_say_why() -> None:
-    limits = Quality(no_zigzag=1, not_converged=0, vessels={"b": Limits(not_converged=None)})
+    limits = FleetLimits(no_zigzag=1, not_converged=0, vessels={"b": Limits(not_converged=None)})
     assert fleet_report.beyond(report(no_zigzag=1), limits) == []
     assert fleet_report.beyond(report(no_zigzag=2, channels=9), limits) == ["2 logs without a manoeuvre to fit"]
     # what a vessel does not name is as for the fleet

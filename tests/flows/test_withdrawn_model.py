@@ -9,7 +9,7 @@ import pytest
 
 from kempf.flows.jobs.corrections.remove_logs import rename_vessel
 from kempf.flows.jobs.identify.chosen_set import chosen_set
-from kempf.flows.jobs.identify.pending import Waiting
+from kempf.flows.jobs.identify.pending import PendingSets
 from kempf.flows.jobs.identify.standing_model import POOLED, standing_model, undo
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
@@ -50,7 +50,7 @@ def warehouse(tmp_path: Path) -> Warehouse:
 
 def test_a_withdrawn_model_is_not_replaced_by_the_plain_one(warehouse: Warehouse) -> None:
     aliases.withdraw(warehouse, "aurora")
-    waiting = Waiting(warehouse, "aurora")
+    waiting = PendingSets(warehouse, "aurora")
     assert not waiting.may_move(PLAIN, adopt=True)
     assert waiting.may_move(LAGGING, adopt=False)
     assert standing_model(warehouse, "aurora")[0] == LAGGING
@@ -61,7 +61,7 @@ def test_a_withdrawn_model_is_not_replaced_by_the_plain_one(warehouse: Warehouse
 
 def test_a_model_whose_set_is_lost_is_replaced_only_where_a_person_asks(warehouse: Warehouse) -> None:
     aliases.point_all(warehouse, {("aurora", aliases.CURRENT): "ps-" + "0" * 16})
-    waiting = Waiting(warehouse, "aurora")
+    waiting = PendingSets(warehouse, "aurora")
     assert not waiting.may_move(PLAIN, adopt=False)
     assert waiting.may_move(PLAIN, adopt=True)
 
@@ -70,7 +70,7 @@ def test_a_renamed_vessel_has_the_model_that_she_had(warehouse: Warehouse) -> No
     name = of_model(LAGGING).parameter_set_id
     aliases.point_all(warehouse, {("boreas", aliases.WITHDRAWN): name})
     assert standing_model(warehouse, "boreas")[0] == LAGGING
-    assert not Waiting(warehouse, "boreas").may_move(PLAIN, adopt=False)
+    assert not PendingSets(warehouse, "boreas").may_move(PLAIN, adopt=False)
 
 
 def test_a_rename_hands_the_model_on(warehouse: Warehouse) -> None:

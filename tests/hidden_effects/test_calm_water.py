@@ -12,7 +12,7 @@ from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, theta
 from benchmarks.identify.prediction.calm_water import truth_of
 from benchmarks.identify.prediction.compared import ANGLES_DEG, RUDDERS_DEG, circle, zigzag
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from tests.manoeuvre.ships import ship_of
 
 
@@ -27,7 +27,7 @@ def test_the_figures_in_calm_water_are_those_of_the_plant(name: str) -> None:
     ship = replace(ship, waters=replace(ship.waters, day=1.0))
     truth = truth_of(hull, theta(effect, c, hull))
     wanted = {circle(rudder): PredictedCircle(radians(rudder)) for rudder in RUDDERS_DEG}
-    wanted |= {zigzag(*angles): Zigzag(*(radians(x) for x in angles)) for angles in ANGLES_DEG}
+    wanted |= {zigzag(*angles): PredictedZigzag(*(radians(x) for x in angles)) for angles in ANGLES_DEG}
     for manoeuvre, asked in wanted.items():
         made = asked.sailed(ship)
         assert made is not None

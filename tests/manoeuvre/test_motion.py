@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.manoeuvre import motion
-from kempf.pipeline.manoeuvre.pull_out import PullOut
-from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.pull_out import PredictedPullOut
+from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.pipeline.simulate import manoeuvre as sailed
 from kempf.pipeline.simulate.hulls import HULLS
@@ -42,7 +42,7 @@ def test_zigzags_are_those_of_the_simulator(heading: float, rudder: float) -> No
     hull = HULLS["ferry"]
     programme = (sailed.SteadyCourse(10.0), sailed.ZigzagTest(heading, rudder, "port", legs=4))
     truth = simulate_trial(TrialSettings(hull, programme)).truth.zigzags[0]
-    made = Zigzag(radians(heading), radians(rudder), side=-1).sailed(ship_of(hull))
+    made = PredictedZigzag(radians(heading), radians(rudder), side=-1).sailed(ship_of(hull))
     assert made is not None
     found = [made.figures[f"overshoots_deg.{k}"] for k in range(len(truth.overshoots_rad))]
     np.testing.assert_allclose(found, np.degrees(truth.overshoots_rad), rtol=2e-3)
@@ -74,13 +74,13 @@ def test_a_hull_that_turns_by_herself_without_damping_is_no_ship() -> None:
     assert ship.unstable
     assert not ship_of(HULLS["tanker"]).unstable
     assert PredictedCircle(radians(35.0)).sailed(ship) is None
-    assert PullOut(radians(20.0)).sailed(ship) is None
-    assert Spiral(radians(20.0)).sailed(ship) is None
+    assert PredictedPullOut(radians(20.0)).sailed(ship) is None
+    assert PredictedSpiral(radians(20.0)).sailed(ship) is None
 
 
 def test_what_a_pull_out_leaves_is_where_the_spirals_loop_crosses() -> None:
     ship = unstable()
-    spiral, out = Spiral(radians(20.0)), PullOut(radians(20.0))
+    spiral, out = PredictedSpiral(radians(20.0)), PredictedPullOut(radians(20.0))
     curve, left = spiral.sailed(ship), out.sailed(ship)
     assert curve is not None
     assert left is not None
@@ -95,7 +95,7 @@ def test_what_a_pull_out_leaves_is_where_the_spirals_loop_crosses() -> None:
 
 def test_a_stable_ship_has_no_loop_and_comes_out_of_her_turn() -> None:
     ship = ship_of(HULLS["ferry"])
-    curve, out = Spiral(radians(20.0)).sailed(ship), PullOut(radians(20.0)).sailed(ship)
+    curve, out = PredictedSpiral(radians(20.0)).sailed(ship), PredictedPullOut(radians(20.0)).sailed(ship)
     assert curve is not None
     assert out is not None
     assert curve.figures["loop_width_deg"] == curve.figures["loop_height_deg_s"] == 0.0
@@ -150,7 +150,7 @@ def test_a_neutral_angle_is_held_on_the_approach() -> None:
 
 def test_a_late_helmsman_makes_the_overshoot_larger() -> None:
     ship = ship_of(HULLS["mariner"])
-    zigzag = Zigzag(radians(10.0), radians(10.0))
+    zigzag = PredictedZigzag(radians(10.0), radians(10.0))
     late = replace(zigzag, switched_rad=(radians(12.0),))
     prompt, delayed = zigzag.sailed(ship), late.sailed(ship)
     assert prompt is not None
@@ -209,7 +209,9 @@ def test_a_slow_gear_makes_the_advance_longer_by_the_way_that_it_takes() -> None
 
 def test_circle_pull_out_and_spiral_come_to_the_same_steady_turn() -> None:
     ship = ship_of(HULLS["ferry"])
-    circle, out, spiral = (one.sailed(ship) for one in (PredictedCircle(0.35), PullOut(0.35), Spiral(0.35)))
+    circle, out, spiral = (
+        one.sailed(ship) for one in (PredictedCircle(0.35), PredictedPullOut(0.35), PredictedSpiral(0.35))
+    )
     assert circle is not None
     assert out is not None
     assert spiral is not None
@@ -222,7 +224,7 @@ def test_a_spiral_goes_on_where_more_rudder_turns_her_no_faster() -> None:
     ship = unstable()
     # a turn costs her so much speed that the yaw rate falls again before hard over
     slow = replace(ship, surge=np.array([6.0, 0.0, 0.3, 6.0, 0.0]))
-    made = Spiral(radians(35.0)).sailed(slow)
+    made = PredictedSpiral(radians(35.0)).sailed(slow)
     assert made is not None
     rates = [made.figures[f"from_starboard_deg_s.{k}"] for k in range(4)]
     assert rates[0] < max(rates[1:])

@@ -10,7 +10,7 @@ from kempf.pipeline.manoeuvre.conditioned import OwnZigzag, conditioned
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.own_zigzags import MOST, REFERENCE, held_against, missed, scatter
 from kempf.pipeline.manoeuvre.ship import Ship
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.confidence import NORMAL_95
 from tests.manoeuvre.ships import identified, ship_of
@@ -52,7 +52,7 @@ def test_one_gust_scatters_nothing_and_few_overshoots_say_nothing() -> None:
 def _zigzags(truth: Ship, model: Identified) -> list[OwnZigzag]:
     found = []
     for rudder in (10.0, 15.0, 20.0, 25.0):
-        zigzag = Zigzag(radians(10.0), radians(rudder), overshoots=2)
+        zigzag = PredictedZigzag(radians(10.0), radians(rudder), overshoots=2)
         made = zigzag.sailed(truth)
         assert made is not None
         measured = {name: value for name, value in made.figures.items() if name.startswith("overshoots")}
@@ -66,7 +66,7 @@ def test_a_model_off_by_many_errors_is_brought_to_the_overshoots_and_predicts_an
     model = identified(wrong, relative=0.005)
     near = conditioned(model, _zigzags(truth, model))
     assert near.conditioned
-    other = Zigzag(radians(20.0), radians(20.0))
+    other = PredictedZigzag(radians(20.0), radians(20.0))
 
     def overshoot(ship: Ship) -> float:
         made = other.sailed(ship)

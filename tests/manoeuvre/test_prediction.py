@@ -9,7 +9,7 @@ from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.prediction import predict
 from kempf.pipeline.manoeuvre.sailed import Reach
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.errors import DataRejected
@@ -78,19 +78,19 @@ def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> 
     }
     assert circle["advance"].limit == pytest.approx(4.5 * 160.93)
     assert circle["tactical diameter"].probability == 1.0
-    zigzag = {one.name: one for one in made(model, Zigzag(radians(10.0), radians(10.0))).imo}
+    zigzag = {one.name: one for one in made(model, PredictedZigzag(radians(10.0), radians(10.0))).imo}
     assert zigzag["initial turning"].limit == pytest.approx(2.5 * 160.93)
     assert zigzag["10/10 first overshoot"].limit == pytest.approx(5.0 + 0.5 * 160.93 / 7.7175)
     assert "35 deg" in made(model).imo[0].why
-    blind = made(model, Zigzag(radians(10.0), radians(10.0)), None).imo
+    blind = made(model, PredictedZigzag(radians(10.0), radians(10.0)), None).imo
     assert all(one.probability is None and "length" in one.why for one in blind)
-    assert made(model, Zigzag(radians(5.0), radians(15.0))).imo == ()
+    assert made(model, PredictedZigzag(radians(5.0), radians(15.0))).imo == ()
     some = predict([model], PredictedCircle(radians(35.0)), LOGS, Particulars(389.0 / 4.5), 64).imo[0]
     assert some.probability is not None
     assert 0.0 < some.probability < 1.0
     assert "100 m" in some.why
     # of a model the limits of the overshoots are not those of its ship
-    small = {one.name: one for one in made(model, Zigzag(radians(10.0), radians(10.0)), 7.0).imo}
+    small = {one.name: one for one in made(model, PredictedZigzag(radians(10.0), radians(10.0)), 7.0).imo}
     assert small["10/10 first overshoot"].probability is None
     assert "7 m long" in small["10/10 first overshoot"].why
     assert small["initial turning"].probability is not None
@@ -124,7 +124,7 @@ def test_draws_that_are_no_ships_are_counted() -> None:
 
 
 def test_criteria_of_a_model_are_those_of_its_ship() -> None:
-    model, ten = identified(ship_of(HULLS["mariner"])), Zigzag(radians(10.0), radians(10.0))
+    model, ten = identified(ship_of(HULLS["mariner"])), PredictedZigzag(radians(10.0), radians(10.0))
     ship = {one.name: one for one in made(model, ten).imo}
     scaled = {one.name: one for one in predict([model], ten, LOGS, Particulars(160.93 / 4.0, None, 4.0), 64).imo}
     # half the seconds for a length: those of a ship of a quarter of the length and half the speed are as many

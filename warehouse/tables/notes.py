@@ -20,7 +20,7 @@ _CARRIED = re.compile(r", note ([0-9]+)\]$")
 Subject = Literal["vessel", "log", "segment", "set"]
 
 
-class Sailed(Protocol):
+class LogStretch(Protocol):
     """A stretch of a log, such as a manoeuvre."""
 
     @property
@@ -218,7 +218,7 @@ def _carried(note: Note) -> str:
     return f"{note.text} [{note.vessel}, note {note.number}]"
 
 
-def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, float]:
+def draughts_m(among: Sequence[Note], sailed: Iterable[LogStretch]) -> dict[str, float]:
     """Return the draught of logs as notes have it.
 
     A note on a log is the log's, the newest one counts; else the last one on the vessel that is dated no later than the

@@ -177,7 +177,7 @@ def _chain(parameter_set: ParameterSet, known: Mapping[str, ParameterSet]) -> tu
 
 
 @dataclass(frozen=True)
-class Pooled:
+class PooledSet:
     """What is known of a pooled set without reading all of it."""
 
     parameter_set_id: str
@@ -203,7 +203,7 @@ class Pooled:
         return self.updates.fitted_at_once if self.updates else len(self.segment_ids)
 
 
-def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str) -> list[Pooled]:
+def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str) -> list[PooledSet]:
     """Return what is known of a vessel's sets of one model and estimator, sorted by id."""
     where: Where = {"vessel_key": vessel_key(vessel), "model_sha256": model_sha256, "estimator": estimator}
     columns = ("parameter_set_id", "segment_ids", "settings_json", "provenance_json")
@@ -211,7 +211,7 @@ def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str)
     provenance = frame["provenance_json"].str
     codes, profiles = (provenance.json_path_match(f"$.{key}").to_list() for key in ("code_version", "profile_sha256"))
     return [
-        Pooled(name, tuple(ids), loads(settings), code, profile)
+        PooledSet(name, tuple(ids), loads(settings), code, profile)
         for (name, ids, settings, _), code, profile in zip(frame.rows(), codes, profiles, strict=True)
     ]
 

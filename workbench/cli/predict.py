@@ -20,8 +20,8 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre
-    from kempf.flows.jobs.predict.predicted import Predicted
+    from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre
+    from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
     from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
@@ -111,7 +111,7 @@ def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | Non
         raise UsageError("usage", f"A {manoeuvre} has no --angles.", "Give its rudder with --rudder.")
 
 
-def _title(predicted: Predicted) -> str:
+def _title(predicted: PredictedManoeuvre) -> str:
     manoeuvre = predicted.as_json()["manoeuvre"]
     kind = manoeuvre["kind"].replace("-", " ")
     words = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
@@ -124,7 +124,7 @@ def _title(predicted: Predicted) -> str:
     )
 
 
-def _print_predicted(predicted: Predicted, figure: Path | None) -> None:
+def _print_predicted(predicted: PredictedManoeuvre, figure: Path | None) -> None:
     shown = predicted.as_json()
     manoeuvre = shown["manoeuvre"]
     scale = predicted.basis.particulars.model_scale
@@ -166,13 +166,13 @@ def _row(name: str, figure: PredictedFigure, manoeuvre: dict[str, Any], model_sc
     return [*row, number(full["value"]), f"{number(full['low'])} to {number(full['high'])}"]
 
 
-def _with_half(beside: Beside) -> str:
+def _with_half(beside: ComparedFigure) -> str:
     """Return what was measured with half its own interval, where that is known."""
     low, high = beside.measured_low, beside.measured_high
     return number(beside.measured) + ("" if low is None or high is None else f" ± {number(0.5 * (high - low), 2)}")
 
 
-def _print_models(predicted: Predicted) -> None:
+def _print_models(predicted: PredictedManoeuvre) -> None:
     first = next(iter(predicted.prediction.figures))
     words, unit = FIGURES[first.partition(".")[0]]
     rows = []

@@ -16,7 +16,7 @@ from kempf.workbench.numbers import number
 from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.steering.steer_vessel import Steered, Tried
+    from kempf.flows.jobs.steering.steer_vessel import Steered, TriedLaw
 
 
 @click.command("steer", cls=GivenOnce)
@@ -103,7 +103,7 @@ def _show(outcome: Steered, figure: Path | None) -> dict[str, Any]:
     }
 
 
-def _law(tried: Tried) -> dict[str, Any]:
+def _law(tried: TriedLaw) -> dict[str, Any]:
     p, law, loop = tried.performance, tried.law, tried.loop
     return {
         "parameters": tried.label,

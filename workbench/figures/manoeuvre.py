@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.manoeuvre.prediction import Prediction
-from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.workbench.figures.diagnosis_style import FAINT, FULL, INK, LIMIT, new_figure, style
 from kempf.workbench.figures.drawn import save
 
@@ -35,9 +35,9 @@ def draw_manoeuvre(prediction: Prediction, path: Path, title: str = "") -> None:
         figure.suptitle(title, x=0.02, ha="left", fontsize=9.5)
         if isinstance(prediction.manoeuvre, PredictedCircle):
             _circle(panel, prediction)
-        elif isinstance(prediction.manoeuvre, Zigzag):
+        elif isinstance(prediction.manoeuvre, PredictedZigzag):
             _zigzag(panel, prediction, prediction.manoeuvre)
-        elif isinstance(prediction.manoeuvre, Spiral):
+        elif isinstance(prediction.manoeuvre, PredictedSpiral):
             _spiral(panel, prediction)
         else:
             _pull_out(panel, prediction)
@@ -95,7 +95,7 @@ def _circle(panel: Any, prediction: Prediction) -> None:
     panel.set_ylabel("along the approach, m")
 
 
-def _zigzag(panel: Any, prediction: Prediction, manoeuvre: Zigzag) -> None:
+def _zigzag(panel: Any, prediction: Prediction, manoeuvre: PredictedZigzag) -> None:
     nominal = np.degrees(manoeuvre.heading_rad)
     panel.axhline(0.0, color=INK, lw=0.5)
     for side in (-1, 1):
@@ -140,7 +140,7 @@ def _spiral(panel: Any, prediction: Prediction) -> None:
     panel.axhline(0.0, color=INK, lw=0.5)
     panel.axvline(0.0, color=INK, lw=0.5)
     _ships(panel, prediction, 0, 1, (np.degrees(1.0), np.degrees(1.0)))
-    assert isinstance(prediction.manoeuvre, Spiral)
+    assert isinstance(prediction.manoeuvre, PredictedSpiral)
     for name, marker, words in (
         ("from_starboard_deg_s", "v", "direct spiral, from starboard"),
         ("from_port_deg_s", "^", "direct spiral, from port"),

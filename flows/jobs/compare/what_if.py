@@ -35,7 +35,7 @@ MOST_INSTANTS = 150
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class TriedValue:
     """One value of the parameter."""
 
     value: float
@@ -65,7 +65,7 @@ class WhatIf:
     std: float | None
     run: BoundRun
     #: In ascending order of the value; the estimate is among them.
-    tried: tuple[Tried, ...]
+    tried: tuple[TriedValue, ...]
     #: Whether the parameters are those fitted to legs, which predictions take.
     by_legs: bool = False
 
@@ -95,7 +95,7 @@ class WhatIf:
         }
         return {"time_s": run.time_s, "rudder_angle_rad": run.rudder_rad, **shown}
 
-    def predicted(self, attempt: Tried) -> dict[str, Float]:
+    def predicted(self, attempt: TriedValue) -> dict[str, Float]:
         """Return what one value predicts of it, each of shape (n,), as `measured` does."""
         zero = first_heading(self.run.filtered.run)
         return {
@@ -167,7 +167,7 @@ def what_if(
         free = free_run_of(run.filtered, *moved)
         error = 100.0 * free.relative_error
         tried.append(
-            Tried(
+            TriedValue(
                 estimate.value + move * step,
                 move * _STEP if std is not None else None,
                 here - _log_likelihood(bound_runs, place, move * step),

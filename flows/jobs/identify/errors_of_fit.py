@@ -14,7 +14,7 @@ from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty
 
 
 @dataclass(frozen=True, eq=False)
-class Errors:
+class FitErrors:
     """What is known of the errors of a fit, before what the runs disagree about widens them."""
 
     #: The fit as it is stated: instants of measurement that are not quite known are free.
@@ -38,7 +38,7 @@ class Errors:
         return replace(both, covariance=both.covariance * agreement.widened**2)
 
 
-def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
+def errors_of(fit: PooledFit, known: PooledUncertainty) -> FitErrors:
     """Return a fit and its errors, instants free; those of a model with effects are the ones that its diagnosis states.
 
     Parameters
@@ -51,4 +51,4 @@ def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         instants = with_instants(fit, workers)
-    return Errors(instants.fit, known, instants.covariance, of_effects)
+    return FitErrors(instants.fit, known, instants.covariance, of_effects)

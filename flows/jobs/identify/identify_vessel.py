@@ -11,7 +11,7 @@ from typing import Any
 from kempf.flows.jobs.identify.chosen_manoeuvres import no_segments, without_log
 from kempf.flows.jobs.identify.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings
 from kempf.flows.jobs.identify.parameter_set_of import SetRequest, arm_of, as_parameter_set, without_arm
-from kempf.flows.jobs.identify.pending import Waiting, waiting
+from kempf.flows.jobs.identify.pending import PendingSets, waiting
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, SINGLE, Own, effect_settings
 from kempf.flows.jobs.identify.vessel_model import build_single, build_with_errors_that_last
 from kempf.flows.jobs.ingest.log_channels import channels_of
@@ -128,7 +128,7 @@ def identify_segments(
     vessel: str,
     request: Request,
     refreshed: Refreshed,
-    new: Waiting,
+    new: PendingSets,
     *,
     adopt: bool = True,
     flow_run: str | None = None,
@@ -242,7 +242,7 @@ def _identify_log(
     return list(pool.map(one, tasks))
 
 
-def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:
+def _point_to_current(new: PendingSets, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:
     """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged.
 
     Of a vessel without one, to the latest random manoeuvre.

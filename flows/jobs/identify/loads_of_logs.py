@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from kempf.pipeline.estimate.record.loads import loads
-from kempf.warehouse.tables.notes import Sailed
+from kempf.warehouse.tables.notes import LogStretch
 
-S = TypeVar("S", bound=Sailed)
-T = TypeVar("T", bound=Sailed)
+S = TypeVar("S", bound=LogStretch)
+T = TypeVar("T", bound=LogStretch)
 
 
 def in_order(named: Iterable[tuple[str, S]]) -> list[tuple[str, S]]:

@@ -15,7 +15,7 @@ from kempf.warehouse.tables.parameter_set import ParameterSet
 _SETS_A_COMMIT = 8
 
 
-class Waiting:
+class PendingSets:
     """New sets of one vessel, and her aliases; a long list of sets is stored on the way.
 
     Parameters
@@ -71,16 +71,16 @@ class Waiting:
 
 
 @contextmanager
-def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
+def waiting(warehouse: Warehouse, vessel: str) -> Iterator[PendingSets]:
     """Lend a list, and store what is in it also where the block is left by an error."""
-    waiting_list = Waiting(warehouse, vessel)
+    waiting_list = PendingSets(warehouse, vessel)
     try:
         yield waiting_list
     finally:
         store(warehouse, [waiting_list])
 
 
-def store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
+def store(warehouse: Warehouse, lists: Sequence[PendingSets]) -> None:
     """Store what waits of several vessels, in one commit a table."""
     parameter_sets.insert(warehouse, [parameter_set for waiting_list in lists for parameter_set in waiting_list.sets])
     # behind the sets: an alias never points to what is not there

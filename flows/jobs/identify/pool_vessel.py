@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose, without_log
 from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, Request
-from kempf.flows.jobs.identify.pending import Waiting, waiting
+from kempf.flows.jobs.identify.pending import PendingSets, waiting
 from kempf.flows.jobs.identify.standing_model import SINGLE
 from kempf.flows.jobs.identify.update_model import store_up_to_date
 from kempf.flows.process.progress import Progress, silent
@@ -60,7 +60,7 @@ def pool_segments(
     vessel: str,
     request: Request,
     outcomes: Sequence[IdentifyOutcome],
-    new: Waiting,
+    new: PendingSets,
     *,
     adopt: bool = True,
     flow_run: str | None = None,

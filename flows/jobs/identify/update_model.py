@@ -157,7 +157,7 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, inputs
     return None
 
 
-def _segments(row: parameter_sets.Pooled, by_id: Mapping[str, parameter_sets.Pooled]) -> set[str] | None:
+def _segments(row: parameter_sets.PooledSet, by_id: Mapping[str, parameter_sets.PooledSet]) -> set[str] | None:
     """Return the segments that a set rests on; None where one that it brings forward is lost."""
     segment_ids = set(row.segment_ids)
     while row.updates is not None:

@@ -16,7 +16,7 @@ from kempf.warehouse.sources.source_folder import SourceFile
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class FilePlace:
     """Whose a file is, and what its folder says beside her stored profile."""
 
     vessel: str
@@ -36,7 +36,7 @@ class Register:
     #: Vessels that count no longer, by name: no folder makes one of them again.
     former: Mapping[str, FormerVessel] = field(default_factory=dict)
 
-    def place(self, file: SourceFile) -> Place:
+    def place(self, file: SourceFile) -> FilePlace:
         """Return whose a file is.
 
         Raises
@@ -51,9 +51,9 @@ class Register:
         if folder_profile is not None and folder_profile.vessel is not None:
             if folder_profile.vessel in self.former:
                 raise self._for_a_former_one(file, folder_profile.vessel)
-            return Place(folder_profile.vessel, folder_profile)
+            return FilePlace(folder_profile.vessel, folder_profile)
         if file.folder in self.known or (file.folder and self.new_vessels and file.folder not in self.former):
-            return Place(file.folder, folder_profile)
+            return FilePlace(file.folder, folder_profile)
         fit = sorted(name for name, profile in self.known.items() if _fits(profile, file))
         if len(fit) > 1:
             raise UsageError(
@@ -64,7 +64,7 @@ class Register:
                 {"path": file.path, "vessels": fit},
             )
         if fit:
-            return Place(fit[0], folder_profile)
+            return FilePlace(fit[0], folder_profile)
         raise self._not_placed(file)
 
     def _not_placed(self, file: SourceFile) -> KempfError:

@@ -21,7 +21,7 @@ from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.schemas.faults import faults_of
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.schemas.quality import Quality
+from kempf.schemas.quality import FleetLimits
 
 #: Names of a file that says of a folder whose logs are in it and how they are read.
 PROFILES = ("profile.yaml", "profile.yml", "profile.json")
@@ -246,7 +246,7 @@ def _has_guess(content: Any) -> bool:
     return isinstance(content, str) and content.endswith("?")
 
 
-def read_quality(path: Path) -> Quality:
+def read_quality(path: Path) -> FleetLimits:
     """Read a file that says how many findings on logs and models a vessel may have.
 
     Raises

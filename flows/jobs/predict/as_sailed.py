@@ -14,7 +14,7 @@ from kempf.flows.jobs.identify.lasting_noise import with_lasting_noise
 from kempf.flows.jobs.identify.loads_of_logs import loads_beside
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.log_channels import channels_of
-from kempf.flows.jobs.predict.predicted import Predicted
+from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
 from kempf.flows.jobs.predict.prediction_basis import Basis
 from kempf.flows.jobs.predict.spiral_ways import orders_of
 from kempf.flows.process.progress import Progress, silent
@@ -24,12 +24,12 @@ from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.filtered_beginning import start_of, steady_wind, usual_force
 from kempf.pipeline.manoeuvre.initial_conditions import InitialConditions, initial_conditions
-from kempf.pipeline.manoeuvre.pull_out import PullOut
+from kempf.pipeline.manoeuvre.pull_out import PredictedPullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.ship import Start
-from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
@@ -85,7 +85,10 @@ class AsSailed:
 
 
 def as_sailed(
-    warehouse: Warehouse, predicted: Predicted, pairs: Sequence[tuple[Segment, Manoeuvre]], progress: Progress = silent
+    warehouse: Warehouse,
+    predicted: PredictedManoeuvre,
+    pairs: Sequence[tuple[Segment, Manoeuvre]],
+    progress: Progress = silent,
 ) -> list[AsSailed]:
     """Return measured manoeuvres as they were sailed.
 
@@ -96,7 +99,7 @@ def as_sailed(
     pairs : sequence of (Segment, Manoeuvre)
         What was measured, and what of it is to be sailed.
     """
-    zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, Zigzag)]
+    zigzags = [segment for segment, manoeuvre in pairs if isinstance(manoeuvre, PredictedZigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
     usual = _usual_wind(predicted) if len(runs) < len(pairs) else (0.0, 0.0)
     sailed, logs = [], _Logs(warehouse)
@@ -108,7 +111,7 @@ def as_sailed(
 
 
 def _one(
-    predicted: Predicted,
+    predicted: PredictedManoeuvre,
     manoeuvre: Manoeuvre,
     segment: Segment,
     log: Instruments,
@@ -136,7 +139,7 @@ def _one(
     )
 
 
-def _usual_wind(predicted: Predicted) -> tuple[float, float]:
+def _usual_wind(predicted: PredictedManoeuvre) -> tuple[float, float]:
     """Return no wind force, with the root mean square of those that the filter finds in the manoeuvres of the set.
 
     A manoeuvre on which the set is not fitted has a wind of its own, from any side. What wanders about the steady force
@@ -162,7 +165,7 @@ class _Logs:
 
 
 def _runs(
-    warehouse: Warehouse, predicted: Predicted, zigzags: list[Segment], progress: Progress
+    warehouse: Warehouse, predicted: PredictedManoeuvre, zigzags: list[Segment], progress: Progress
 ) -> dict[str, RunFilter]:
     """Return every zigzag whose log can be used, by its id, under the model of the set."""
     chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in zigzags}
@@ -185,14 +188,14 @@ def _runs(
     return {run.name: RunFilter(run, model, basis.runs.spec) for run in runs}
 
 
-def _with_its_noise(predicted: Predicted) -> EffectModel:
+def _with_its_noise(predicted: PredictedManoeuvre) -> EffectModel:
     """Return the model of a set with the lasting noise that was found with it."""
     model = predicted.prediction.models[0].model.waters.model
     return with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))[0]
 
 
 def _beside_the_set(
-    warehouse: Warehouse, predicted: Predicted, chosen: Chosen, progress: Progress
+    warehouse: Warehouse, predicted: PredictedManoeuvre, chosen: Chosen, progress: Progress
 ) -> tuple[GridRun, ...]:
     """Return runs of further manoeuvres as those of the set are: profile, step, slip and load on the set's scale."""
     basis, parameter_set = predicted.basis, predicted.parameter_set
@@ -212,25 +215,25 @@ def _beside_the_set(
 def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
     side = 1 if segment.first_side == "starboard" else -1
     rudder = radians(float(segment.detail.get("delta0_measured_deg") or segment.delta0_deg))
-    if isinstance(manoeuvre, Zigzag):
+    if isinstance(manoeuvre, PredictedZigzag):
         executes = list(segment.detail.get("executes", ()))[1:]
         switched = [radians(abs(float(e["heading_deg"]))) for e in executes]
         return replace(
             manoeuvre, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: manoeuvre.overshoots + 1])
         )
-    if isinstance(manoeuvre, Spiral):
+    if isinstance(manoeuvre, PredictedSpiral):
         return replace(manoeuvre, rudder_rad=rudder, held_rad=tuple(map(radians, orders_of(segment))))
     if isinstance(manoeuvre, PredictedCircle):
         # the steady figures are means over the last turn: of as many turns as were sailed
         turned = radians(abs(float(segment.detail["heading_change_deg"])))
         return replace(manoeuvre, side=side, rudder_rad=rudder, turn_rad=turned)
-    if isinstance(manoeuvre, PullOut):
+    if isinstance(manoeuvre, PredictedPullOut):
         after = float(segment.detail["rudder_after_deg"])
         return replace(manoeuvre, side=side, rudder_rad=rudder, after_rad=radians(after))
     return replace(manoeuvre, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 
-def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:
+def _passed(run: RunFilter, predicted: PredictedManoeuvre) -> Passed | None:
     """Return a manoeuvre passed through the filter of the set, None for a set without noise levels."""
     levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
     if not levels:

@@ -8,27 +8,32 @@ from math import degrees, hypot, radians
 from typing import Any
 
 from kempf.flows.jobs.predict.as_sailed import AsSailed, as_sailed
-from kempf.flows.jobs.predict.predicted import Predicted
+from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
 from kempf.flows.jobs.predict.spiral_ways import SAME_ORDER_DEG, rates_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure, predict
-from kempf.pipeline.manoeuvre.pull_out import PullOut
+from kempf.pipeline.manoeuvre.pull_out import PredictedPullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
-from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.schemas.errors import KempfError
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import segments
 from kempf.warehouse.tables.segments import Segment
 
-_KINDS: dict[type, str] = {PredictedCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
+_KINDS: dict[type, str] = {
+    PredictedCircle: "turning_circle",
+    PredictedZigzag: "zigzag",
+    PredictedPullOut: "pull_out",
+    PredictedSpiral: "spiral",
+}
 #: ships drawn for each measured manoeuvre
 _DRAWS = 128
 
 
 @dataclass(frozen=True)
-class Beside:
+class ComparedFigure:
     """One figure, measured and predicted."""
 
     name: str
@@ -77,7 +82,7 @@ class MeasuredManoeuvre:
     wind_force_std_m_s2: float
     #: ``fitted`` where the set was identified from it, ``held_out`` else.
     sample: str
-    figures: tuple[Beside, ...]
+    figures: tuple[ComparedFigure, ...]
     #: Of a spiral: the rudder angles that it held, deg, as its figures are numbered.
     orders_deg: tuple[float, ...] = ()
     #: Why there is no prediction; empty where there is one.
@@ -89,7 +94,7 @@ class MeasuredManoeuvre:
 
 
 def measured_beside(
-    warehouse: Warehouse, predicted: Predicted, progress: Progress = silent
+    warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progress = silent
 ) -> tuple[MeasuredManoeuvre, ...]:
     """Lay the prediction over the measured manoeuvres of the same kind and angles, to both sides.
 
@@ -109,28 +114,28 @@ def measured_beside(
     return tuple(beside(predicted, sailed) for sailed in every)
 
 
-def measured_kind(warehouse: Warehouse, predicted: Predicted) -> int:
+def measured_kind(warehouse: Warehouse, predicted: PredictedManoeuvre) -> int:
     """Return how many manoeuvres of the kind of a prediction were measured."""
     kind = _KINDS[type(predicted.prediction.manoeuvre)]
     return sum(segment.kind == kind for segment in segments.every(warehouse, predicted.vessel))
 
 
-def other_orders(warehouse: Warehouse, predicted: Predicted) -> dict[str, int]:
+def other_orders(warehouse: Warehouse, predicted: PredictedManoeuvre) -> dict[str, int]:
     """Return how many manoeuvres of the same kind `measured_beside` leaves out, by the option that predicts them."""
     manoeuvre = predicted.prediction.manoeuvre
     counts: dict[str, int] = {}
     for segment in segments.every(warehouse, predicted.vessel):
         if segment.kind == _KINDS[type(manoeuvre)] and not _same_order(segment, manoeuvre):
             angles = f"--angles {segment.psi0_deg:g}/{segment.delta0_deg:g}"
-            option = angles if isinstance(manoeuvre, Zigzag) else f"--rudder {segment.delta0_deg:g}"
+            option = angles if isinstance(manoeuvre, PredictedZigzag) else f"--rudder {segment.delta0_deg:g}"
             counts[option] = counts.get(option, 0) + 1
     return dict(sorted(counts.items()))
 
 
-def own_zigzags(warehouse: Warehouse, predicted: Predicted, progress: Progress = silent) -> list[AsSailed]:
+def own_zigzags(warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progress = silent) -> list[AsSailed]:
     """Return all zigzags of the vessel, whatever their angles, with their first two overshoots."""
     every = [s for s in segments.current(warehouse, predicted.vessel) if s.kind == "zigzag"]
-    pairs = [(s, Zigzag(radians(s.psi0_deg), radians(s.delta0_deg), overshoots=2)) for s in every]
+    pairs = [(s, PredictedZigzag(radians(s.psi0_deg), radians(s.delta0_deg), overshoots=2)) for s in every]
     return as_sailed(warehouse, predicted, pairs, progress)
 
 
@@ -139,12 +144,12 @@ def _same_order(segment: Segment, manoeuvre: Manoeuvre) -> bool:
         return False
     rudder = radians(segment.delta0_deg)
     same = abs(rudder - manoeuvre.rudder_rad) < radians(SAME_ORDER_DEG)  # type: ignore[attr-defined]
-    if isinstance(manoeuvre, Zigzag):
+    if isinstance(manoeuvre, PredictedZigzag):
         return same and abs(radians(segment.psi0_deg) - manoeuvre.heading_rad) < radians(SAME_ORDER_DEG)
-    return same or isinstance(manoeuvre, Spiral)
+    return same or isinstance(manoeuvre, PredictedSpiral)
 
 
-def beside(predicted: Predicted, sailed: AsSailed) -> MeasuredManoeuvre:
+def beside(predicted: PredictedManoeuvre, sailed: AsSailed) -> MeasuredManoeuvre:
     """Lay a prediction over one manoeuvre."""
     segment, basis = sailed.segment, predicted.basis
     models = [sailed.on_the_day(each.model, basis) for each in predicted.prediction.models]
@@ -154,11 +159,11 @@ def beside(predicted: Predicted, sailed: AsSailed) -> MeasuredManoeuvre:
     except KempfError as error:
         return MeasuredManoeuvre(*about, (), why=error.message)
     figures = tuple(
-        Beside(name, *_measured(figure), prediction.figures[name])
+        ComparedFigure(name, *_measured(figure), prediction.figures[name])
         for name, figure in figures_of(segment).items()
         if name in prediction.figures and _measured(figure)[0] is not None
     )
-    held = sailed.manoeuvre.orders_rad if isinstance(sailed.manoeuvre, Spiral) else ()
+    held = sailed.manoeuvre.orders_rad if isinstance(sailed.manoeuvre, PredictedSpiral) else ()
     return MeasuredManoeuvre(*about, figures, tuple(round(degrees(angle), 3) for angle in held))
 
 

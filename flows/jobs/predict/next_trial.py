@@ -15,7 +15,7 @@ import numpy as np
 from kempf.flows.jobs.compare.bound_runs import BoundRuns, bound
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
-from kempf.flows.jobs.predict.predicted import Predicted
+from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
@@ -23,8 +23,8 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.draws import Identified
-from kempf.pipeline.manoeuvre.ship import Track
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.ship import SailedTrack
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.pipeline.next_trial.planned_run import as_predicted, planned
 from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
 from kempf.schemas.errors import DataRejected, UsageError
@@ -53,7 +53,7 @@ _FURTHER_DEG = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Trial:
+class ProposedZigzag:
     """A zigzag that could be sailed, and what it is worth."""
 
     angles_deg: tuple[float, float]
@@ -93,9 +93,9 @@ class NextTrial:
     #: Whose interval is to be halved; None where all count.
     parameter: str | None
     #: The best first.
-    trials: tuple[Trial, ...]
+    trials: tuple[ProposedZigzag, ...]
     #: Of the best by the set's model and those that fit as well.
-    predicted: Predicted
+    predicted: PredictedManoeuvre
     #: What was taken for granted, sentences.
     remarks: tuple[str, ...]
 
@@ -250,7 +250,7 @@ def next_trial(
     )
 
 
-def _rank(trial: Trial, parameter: str | None) -> tuple[float, float]:
+def _rank(trial: ProposedZigzag, parameter: str | None) -> tuple[float, float]:
     """Return what the best trial has least of."""
     if parameter is not None:
         # one run may narrow more than another by which the error never halves
@@ -272,7 +272,7 @@ class _Model:
     #: Of the parameters in ``known``.
     known_names: tuple[str, ...]
 
-    def over(self, track: Track) -> RunFilter:
+    def over(self, track: SailedTrack) -> RunFilter:
         """Return its filter over a planned run as it predicts that itself."""
         run = planned(track, self.identified.ship, self.like.run, self.like.spec)
         filtered = replace(self.like, run=run)
@@ -301,7 +301,7 @@ def _names_of_ship(model: Identified) -> tuple[str, ...]:
 
 def _trial(
     angles: tuple[float, float], models: Sequence[_Model], sailed_rad: float, parameter: str | None, of_ship: list[str]
-) -> Trial | None:
+) -> ProposedZigzag | None:
     """Return what one zigzag is worth; None where the ship of the first model cannot sail it.
 
     Parameters
@@ -309,7 +309,7 @@ def _trial(
     sailed_rad : float
         Largest rudder that was sailed.
     """
-    zigzag = Zigzag(radians(angles[0]), radians(angles[1]))
+    zigzag = PredictedZigzag(radians(angles[0]), radians(angles[1]))
     tracks = [zigzag.track(model.identified.ship) for model in models]
     over = [model.over(t) if t.how == motion.SAILED else None for model, t in zip(models, tracks, strict=True)]
     first, track = models[0], tracks[0]
@@ -323,7 +323,7 @@ def _trial(
             if run is not None and other is not true:
                 D = apart(replace(other.like, run=run.run), other.point, other.known)
                 parts[true.identified.name, other.identified.name] = probability(D, WINDOW)
-    return Trial(
+    return ProposedZigzag(
         angles_deg=angles,
         duration_s=float(track.column(motion.TIME)[-1]),
         sea_room_m=(
@@ -339,7 +339,7 @@ def _trial(
     )
 
 
-def _show(trial: Trial) -> dict[str, Any]:
+def _show(trial: ProposedZigzag) -> dict[str, Any]:
     return {
         "manoeuvre": {"kind": "zigzag", "heading_deg": trial.angles_deg[0], "rudder_deg": trial.angles_deg[1]},
         "duration_s": trial.duration_s,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import sqrt
 from statistics import mean, median, stdev
 
-from kempf.flows.jobs.predict.compare_predicted import Beside, MeasuredManoeuvre
+from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre
 
 #: manoeuvres, and standard errors of their mean, from which it is hardly chance that all lie to one side
 _FEWEST, _CLEAR = 4, 3.0
@@ -57,7 +57,7 @@ def one_sided(measured: Sequence[MeasuredManoeuvre]) -> tuple[OneSided, ...]:
     measured : sequence of MeasuredManoeuvre
         To both sides: figures that change their sign with the side are compared by their size.
     """
-    by_figure: dict[str, list[Beside]] = {}
+    by_figure: dict[str, list[ComparedFigure]] = {}
     for manoeuvre in measured:
         for beside in manoeuvre.figures:
             # steps of spirals are numbered by the angles of each

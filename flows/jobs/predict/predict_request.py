@@ -49,20 +49,20 @@ class PredictRequest:
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
     """Return the manoeuvre that is asked for; errors are those of `required`."""
     # the kernels that sail them take a while to load, and whoever only asks does not need them
-    from kempf.pipeline.manoeuvre.pull_out import PullOut
-    from kempf.pipeline.manoeuvre.spiral import Spiral
+    from kempf.pipeline.manoeuvre.pull_out import PredictedPullOut
+    from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
     from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
-    from kempf.pipeline.manoeuvre.zigzag import Zigzag
+    from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 
     required(request)
     side = 1 if request.side == "starboard" else -1
     if request.kind == "zigzag":
         heading, rudder = request.angles_deg
-        return Zigzag(radians(heading), radians(rudder), side)
+        return PredictedZigzag(radians(heading), radians(rudder), side)
     angle = _rudder_deg(request)
     if request.kind == "turning-circle":
         return PredictedCircle(radians(angle), side)
-    return PullOut(radians(angle), side) if request.kind == "pull-out" else Spiral(radians(angle))
+    return PredictedPullOut(radians(angle), side) if request.kind == "pull-out" else PredictedSpiral(radians(angle))
 
 
 def angles_of(text: str, option: str = "") -> tuple[float, float]:

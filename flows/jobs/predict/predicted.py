@@ -13,8 +13,8 @@ from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags
 from kempf.pipeline.manoeuvre.prediction import Prediction
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
-from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
+from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: what is taken of a channel that a manoeuvre in calm water has not
@@ -31,7 +31,7 @@ _INSTRUMENTS = {"lateral_speed", "yaw_rate", "heading"}
 
 
 @dataclass(frozen=True, eq=False)
-class Predicted:
+class PredictedManoeuvre:
     """What the job did."""
 
     vessel: str
@@ -169,13 +169,13 @@ def limits_of(prediction: Prediction, parameter_set: ParameterSet) -> tuple[str,
 
 def _manoeuvre_json(manoeuvre: Manoeuvre) -> dict[str, Any]:
     content: dict[str, Any] = {"kind": manoeuvre.name}
-    if isinstance(manoeuvre, Zigzag):
+    if isinstance(manoeuvre, PredictedZigzag):
         content["heading_deg"] = round(degrees(manoeuvre.heading_rad), 9)
     content["rudder_deg"] = round(degrees(manoeuvre.rudder_rad), 9)  # type: ignore[attr-defined]
     side = getattr(manoeuvre, "side", None)
     if side is not None:
         content["side"] = "starboard" if side > 0 else "port"
-    if isinstance(manoeuvre, Spiral):
+    if isinstance(manoeuvre, PredictedSpiral):
         content["orders_deg"] = [round(degrees(angle), 9) for angle in manoeuvre.orders_rad]
     return content
 

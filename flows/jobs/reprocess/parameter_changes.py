@@ -65,7 +65,7 @@ class NewSet:
 
 
 @dataclass(frozen=True)
-class Paired:
+class PairedSets:
     """Sets of two codes held against each other, see `paired`."""
 
     identical: int
@@ -74,7 +74,7 @@ class Paired:
     gone: tuple[str, ...]
 
 
-def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> Paired:
+def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> PairedSets:
     """Hold the sets of a vessel against those of the same model and estimator whose segments share most of their time.
 
     Parameters
@@ -116,7 +116,7 @@ def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> Paired:
             identical += same
             moves += [] if same else list(_moves(stored, becomes))
     new = [o for o in now if o.parameter_set_id not in taken]
-    return Paired(
+    return PairedSets(
         identical,
         tuple(sorted(moves, key=lambda m: (-m.size, m.parameter_set_id, m.parameter))),
         tuple(NewSet(o.parameter_set_id, o.model_name, o.estimator, iso_utc(o.start_utc_ns)) for o in new),

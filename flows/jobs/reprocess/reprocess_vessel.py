@@ -15,7 +15,7 @@ from shlex import quote
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose, out_of_date
 from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.identify_vessel import IdentifyOutcome, Request, identify_segments
-from kempf.flows.jobs.identify.pending import Waiting, store
+from kempf.flows.jobs.identify.pending import PendingSets, store
 from kempf.flows.jobs.identify.pool_vessel import pool_segments
 from kempf.flows.jobs.identify.standing_model import POOLED, SINGLE, Own, model_of, point, standing_or_withdrawn
 from kempf.flows.jobs.identify.update_model import store_up_to_date
@@ -83,7 +83,7 @@ def reprocess_vessels(
         One a vessel, in the order given. Failures are in them: one bad log stops nothing, one bad vessel no other.
     """
     job = _Reprocessing(warehouse, request, flow_run, progress)
-    works = {vessel: _Work(VesselReport(vessel), Waiting(warehouse, vessel)) for vessel in vessels}
+    works = {vessel: _Work(VesselReport(vessel), PendingSets(warehouse, vessel)) for vessel in vessels}
     all_of_them = list(works.values())
 
     def begin() -> None:
@@ -128,7 +128,7 @@ class _Work:
     """What is known of one vessel while she is brought up to date."""
 
     report: VesselReport
-    new: Waiting
+    new: PendingSets
     before: VesselState | None = None
     requests: Sequence[Request] = ()
     stale: Stale | None = None

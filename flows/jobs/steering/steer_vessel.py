@@ -55,7 +55,7 @@ class SteerRequest:
 
 
 @dataclass(frozen=True, eq=False)
-class Tried:
+class TriedLaw:
     """A law and what came of it."""
 
     #: Whose parameters it was made from.
@@ -80,7 +80,7 @@ class Steered:
     ship: ShipOfSet
     request: SteerRequest
     #: From the set's own parameters, then from the wrong ones if any were asked for.
-    laws: tuple[Tried, ...]
+    laws: tuple[TriedLaw, ...]
     warnings: tuple[str, ...]
 
 
@@ -171,7 +171,7 @@ def _wrong(warehouse: Warehouse, wrong: str, ship: ShipOfSet) -> tuple[str, Hull
     return f"rudder taken for {factor:g} times as effective", hull, ship.effects
 
 
-def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: ShipOfSet, request: SteerRequest) -> Tried:
+def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: ShipOfSet, request: SteerRequest) -> TriedLaw:
     law = course_law(
         hull,
         ship.speed_m_s,
@@ -192,7 +192,7 @@ def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: ShipOfSet,
     track = keep_course(steered, law, 2.0 * request.leg_s, 0.0, ((request.leg_s, request.change_rad),))
     change = course_change(track)
     assert change is not None
-    return Tried(
+    return TriedLaw(
         label,
         hull,
         law,

@@ -34,7 +34,7 @@ _NEVER = "1970-01"
 
 
 @dataclass(frozen=True)
-class Held:
+class IngestOfBefore:
     """One ingest in a table that has a folder a log."""
 
     vessel_key: str
@@ -43,7 +43,7 @@ class Held:
     rows: int
 
 
-def missing(warehouse: Warehouse, name: str) -> list[Held]:
+def missing(warehouse: Warehouse, name: str) -> list[IngestOfBefore]:
     """Return the ingests that are still to be laid out by month, by folder; none of a table that is laid out so.
 
     Parameters
@@ -128,7 +128,7 @@ def _purged(warehouse: Warehouse) -> set[str]:
     return {row.ingest_id for row in logs.all_ingests(warehouse) if row.log_id in gone} if gone else set()
 
 
-def _held(warehouse: Warehouse, name: str, version: int) -> list[Held]:
+def _held(warehouse: Warehouse, name: str, version: int) -> list[IngestOfBefore]:
     """Return the ingests in a version of a table that has a folder a log, by vessel and month."""
     import polars as pl
 
@@ -140,7 +140,9 @@ def _held(warehouse: Warehouse, name: str, version: int) -> list[Held]:
     key, ingest = pl.col("partition.vessel_key").alias("vessel_key"), pl.col("partition.ingest_id").alias("ingest_id")
     rows = files.group_by(key, ingest).agg(pl.col("num_records").sum()).rows()
     months = _months(warehouse, {str(row[1]) for row in rows})
-    ingests = [Held(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows]
+    ingests = [
+        IngestOfBefore(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows
+    ]
     return sorted(ingests, key=lambda ingest: (ingest.vessel_key, ingest.month, ingest.ingest_id))
 
 
@@ -162,11 +164,11 @@ def _months(warehouse: Warehouse, ingests: set[str]) -> dict[str, str]:
     return months
 
 
-def _where(ingest: Held) -> dict[str, str]:
+def _where(ingest: IngestOfBefore) -> dict[str, str]:
     return {"vessel_key": ingest.vessel_key, "ingest_id": ingest.ingest_id}
 
 
-def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame]:
+def _frames(parts: Sequence[tuple[IngestOfBefore, pl.LazyFrame]]) -> Iterator[pl.DataFrame]:
     import polars as pl
 
     for ingest, rows in parts:
@@ -174,7 +176,9 @@ def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame
             yield batch.with_columns(pl.lit(ingest.month).alias("month"))
 
 
-def _commit(table: DeltaTable, name: str, parts: Sequence[tuple[Held, pl.LazyFrame]], *, first: int | None) -> None:
+def _commit(
+    table: DeltaTable, name: str, parts: Sequence[tuple[IngestOfBefore, pl.LazyFrame]], *, first: int | None
+) -> None:
     metadata = None if first is None else {_BEFORE: first}
     with alone(name):
         commits.append_alone(table, name, _frames(parts), lay_out=metadata)

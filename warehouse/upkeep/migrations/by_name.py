@@ -31,7 +31,7 @@ _KEY = "vessel_key"
 
 
 @dataclass(frozen=True)
-class Held:
+class RowsOfBefore:
     """Rows that are under a key of before: those of one folder, or of a vessel in a table without folders."""
 
     key: str
@@ -45,7 +45,7 @@ def tables() -> list[str]:
     return [name for name, table in TABLES.items() if any(column.name == _KEY for column in table.columns)]
 
 
-def missing(warehouse: Warehouse, name: str) -> list[Held]:
+def missing(warehouse: Warehouse, name: str) -> list[RowsOfBefore]:
     """Return what is still under keys of before, by key and month.
 
     Parameters
@@ -159,7 +159,7 @@ def _is_earlier(key: str) -> bool:
     return "-" not in key
 
 
-def _held(table: DeltaTable | None, name: str) -> list[Held]:
+def _held(table: DeltaTable | None, name: str) -> list[RowsOfBefore]:
     """Return what an open table holds, by folder, or by key where it has no folders."""
     import polars as pl
 
@@ -168,12 +168,12 @@ def _held(table: DeltaTable | None, name: str) -> list[Held]:
     folders = table.metadata().partition_columns
     if _KEY not in folders:
         rows = scanned(table, name).group_by(_KEY).agg(pl.len()).collect(engine="streaming").rows()
-        return [Held(str(key), None, count) for key, count in rows]
+        return [RowsOfBefore(str(key), None, count) for key, count in rows]
     files = pl.DataFrame(table.get_add_actions(flatten=True))
     month = pl.col("partition.month") if "month" in folders else pl.lit(None, dtype=pl.String)
     by = [pl.col(f"partition.{_KEY}").alias(_KEY), month.alias("month")]
     counts = files.group_by(by).agg(pl.col("num_records").sum()).rows()
-    return [Held(str(key), month, int(count or 0)) for key, month, count in counts]
+    return [RowsOfBefore(str(key), month, int(count or 0)) for key, month, count in counts]
 
 
 def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
@@ -198,13 +198,13 @@ def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
     return pairs
 
 
-def _wheres(folder: Held, names: dict[str, str]) -> list[dict[str, str]]:
+def _wheres(folder: RowsOfBefore, names: dict[str, str]) -> list[dict[str, str]]:
     """Return what is read of a folder: also what is under the new key already, as it is put in place of both."""
     month = {} if folder.month is None else {"month": folder.month}
     return [{_KEY: key, **month} for key in (folder.key, vessel_key(names[folder.key]))]
 
 
-def _predicate(batch: Sequence[Held], names: dict[str, str]) -> str:
+def _predicate(batch: Sequence[RowsOfBefore], names: dict[str, str]) -> str:
     """Return what names the rows of some folders, under either key."""
     months: dict[str, list[str]] = {}
     for folder in batch:

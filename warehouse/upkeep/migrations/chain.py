@@ -15,7 +15,7 @@ from kempf.warehouse.upkeep.verify import damages, unfinished
 
 
 @dataclass(frozen=True)
-class Step:
+class LayoutStep:
     """What brings a warehouse of one layout to the next."""
 
     #: to_do: What is to be done, a phrase each; carry_out: Does it, however far an earlier attempt came.
@@ -24,7 +24,7 @@ class Step:
 
 
 #: By the layout that each begins with.
-STEPS = {2: Step(to_3.to_do, to_3.carry_out), 3: Step(to_4.to_do, to_4.carry_out)}
+STEPS = {2: LayoutStep(to_3.to_do, to_3.carry_out), 3: LayoutStep(to_4.to_do, to_4.carry_out)}
 
 
 def standing(warehouse: Warehouse) -> int:

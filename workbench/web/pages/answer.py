@@ -13,7 +13,7 @@ from kempf.workbench.web.pages.job import settled
 
 
 @dataclass(frozen=True)
-class Answer:
+class PageResult:
     """What a page asks for, and what came of it."""
 
     #: Arguments of the job, with what the address leaves open.
@@ -37,8 +37,8 @@ class Answer:
         return self.job if self.job is not None and self.job.state in ACTIVE else None
 
 
-def answer(app_state: AppState, kind: str, vessel: str, fields: Mapping[str, str]) -> Answer:
+def answer(app_state: AppState, kind: str, vessel: str, fields: Mapping[str, str]) -> PageResult:
     """Return the answer to the fields of an address; errors are those of `kempf.workbench.web.pages.job.settled`."""
     form = {name: fields.get(name, "") for name in KINDS[kind].fields}
     arguments, digest = settled(app_state, kind, vessel, form)
-    return Answer(arguments, app_state.queue.known(kind, arguments, digest))
+    return PageResult(arguments, app_state.queue.known(kind, arguments, digest))

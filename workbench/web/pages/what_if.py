@@ -10,7 +10,7 @@ from kempf.warehouse.tables.parameter_set import ParameterSet
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.what_if import draw_what_if
-from kempf.workbench.web.pages.answer import Answer, answer
+from kempf.workbench.web.pages.answer import PageResult, answer
 from kempf.workbench.web.pages.manoeuvre_names import names_of
 from kempf.workbench.web.pages.page import Page
 
@@ -50,7 +50,7 @@ def gather(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> Page:
     return Page("what_if.html", "What if", content, ((vessel, of_vessel(vessel)),))
 
 
-def _asked_for(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> tuple[ParameterSet, Answer]:
+def _asked_for(app_state: AppState, vessel: str, fields: Mapping[str, str]) -> tuple[ParameterSet, PageResult]:
     """Return the set that is asked for, and the answer; where no parameter is, of the set's first one."""
     parameter_set = chosen_set(app_state.warehouse, vessel, fields.get("set") or None)[0]
     named = {
