@@ -27,7 +27,8 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import KempfError
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.comparable import comparable_sets
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage import delta
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, logs, parameter_sets
@@ -52,7 +53,7 @@ def current(warehouse: Warehouse) -> ParameterSet:
 
 def pooled(warehouse: Warehouse) -> list[str]:
     """Her pooled sets that stand."""
-    names = history.standing(warehouse, "ferry")
+    names = standing_ids(warehouse, "ferry")
     return [
         one.parameter_set_id for one in parameter_sets.get_all(warehouse, "ferry", names) if one.estimator == POOLED
     ]
@@ -115,13 +116,12 @@ def test_it_says_what_a_fit_of_all_says(own: Warehouse) -> None:
 
 def test_the_last_one_stands_alone_and_is_not_made_twice(own: Warehouse) -> None:
     assert pooled(own) == [current(own).parameter_set_id]
-    assert len(history.standing(own, "ferry")) == FIRST + 3
+    assert len(standing_ids(own, "ferry")) == FIRST + 3
     report = reprocess_vessel(own, "ferry")
     assert report.status == "unchanged" and report.new_sets == 0
     # parameters over time are those of single zigzags
     assert all(
-        "made of several segments" in kind.left_out or kind.parameter_set_ids
-        for kind in history.comparable(own, "ferry")
+        "made of several segments" in kind.left_out or kind.parameter_set_ids for kind in comparable_sets(own, "ferry")
     )
 
 

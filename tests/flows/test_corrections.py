@@ -21,7 +21,7 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.flows.jobs.state.out_of_date import unsearched
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, corrections, examinations, logs, notes, parameter_sets, segments
 from tests.conftest import Ship
@@ -49,7 +49,7 @@ def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
 
 def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Warehouse) -> None:
     (zigzag,) = segments.current(warehouse, "mariner")
-    before = history.standing(warehouse, "mariner")
+    before = standing_ids(warehouse, "mariner")
     assert before and not plan(warehouse, None, changed_only=True).due
     planned = plan_for(warehouse, zigzag.segment_id[:10], "exclude", "the engine was slowed down")
     assert set(planned.affected.set_ids) == set(before) and planned.affected.current
@@ -58,7 +58,7 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     assert segments.current(warehouse, "mariner") == []
     (kept,) = (one for one in segments.found_in(warehouse, "mariner") if one.is_zigzag)
     assert (kept.segment_id, kept.excluded) == (zigzag.segment_id, "the engine was slowed down")
-    assert history.standing(warehouse, "mariner") == []
+    assert standing_ids(warehouse, "mariner") == []
     assert set(aliases.of_vessel(warehouse, "mariner")) == {aliases.WITHDRAWN}
     with pytest.raises(NotFound, match="was corrected or removed") as none:
         chosen_set(warehouse, "mariner", None)
@@ -76,7 +76,7 @@ def test_an_excluded_manoeuvre_counts_nowhere_until_it_is_accepted(warehouse: Wa
     (back,) = segments.current(warehouse, "mariner")
     assert back.segment_id == zigzag.segment_id and back.detail["by_hand"]["action"] == "accept"
     reprocess_vessel(warehouse, "mariner")
-    assert history.standing(warehouse, "mariner") == before
+    assert standing_ids(warehouse, "mariner") == before
     # two people at once: what the one excluded meanwhile is not let count again by the other's bounds
     late = plan_for(warehouse, zigzag.segment_id, "correct", "a better begin", other)
     plan_for(warehouse, zigzag.segment_id, "exclude", "tugs alongside").store(warehouse)
@@ -104,7 +104,7 @@ def test_a_model_keeps_its_effects_without_a_manoeuvre_and_with_it_again(late_ad
 def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse: Warehouse, _filled: Path) -> None:
     (zigzag,) = segments.current(warehouse, "mariner")
     (log,) = logs.current(warehouse)
-    before = history.standing(warehouse, "mariner")
+    before = standing_ids(warehouse, "mariner")
     bounds = zigzag.start_utc_ns + 7 * SECOND_NS, zigzag.end_utc_ns
     planned = plan_for(warehouse, zigzag.segment_id, "correct", "she was still turning", bounds)
     # the approach that is left counts as one: the first leg has no overshoot
@@ -122,7 +122,7 @@ def test_other_bounds_make_another_set_that_is_built_again_bit_for_bit(warehouse
     made = outcome.parameter_set
     assert made.provenance["inputs"]["segments"][0]["start_utc_ns"] == bounds[0]
     assert rerun(warehouse, made.parameter_set_id).verdict == "bit-identical"
-    assert not set(before) & set(history.standing(warehouse, "mariner"))
+    assert not set(before) & set(standing_ids(warehouse, "mariner"))
     # of a correction the next one is of the same manoeuvre, however it is called
     later = bounds[0] + SECOND_NS, bounds[1]
     plan_for(warehouse, corrected.segment_id, "correct", "one second more", later).store(warehouse)

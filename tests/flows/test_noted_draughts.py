@@ -27,7 +27,7 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, logs, notes, parameter_sets, segments, vessels
 from kempf.warehouse.tables.parameter_set import ParameterSet
@@ -107,7 +107,7 @@ def test_a_model_with_the_load_goes_by_the_draughts_once_every_log_has_one(ferry
     # known to be there, and as large as it was made
     assert abs(share.value - SHARE) < 3.0 * share.std < SHARE
     assert by_draught.convergence["log_likelihood"] > by_number.convergence["log_likelihood"] + 10.0
-    standing = history.standing(ferry, "ferry")
+    standing = standing_ids(ferry, "ferry")
     assert by_draught.parameter_set_id in standing and by_number.parameter_set_id not in standing
     assert rerun(ferry, by_draught.parameter_set_id).verdict == "bit-identical"
     assert rerun(ferry, by_number.parameter_set_id).verdict == "bit-identical"
@@ -134,7 +134,7 @@ def test_a_set_is_superseded_where_another_draught_is_noted(ferry: Warehouse) ->
     first = of_load(ferry)
     row = min(logs.current(ferry), key=lambda row: row.file_name)
     notes.add(ferry, "ferry", "log", row.log_id, "misread before", draught_m=6.3)
-    assert first.parameter_set_id not in history.standing(ferry, "ferry")
+    assert first.parameter_set_id not in standing_ids(ferry, "ferry")
     reprocess_vessel(ferry, "ferry")
     assert of_load(ferry).provenance["inputs"]["draughts_m"][row.log_id] == 6.3
     assert rerun(ferry, first.parameter_set_id).verdict == "bit-identical"

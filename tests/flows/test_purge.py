@@ -19,7 +19,7 @@ from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_all import verify_all
 from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.schemas.errors import DataRejected
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage import delta
 from kempf.warehouse.storage.keys import vessel_key
 from kempf.warehouse.storage.store import Warehouse
@@ -96,7 +96,7 @@ def test_nothing_that_was_measured_is_left_in_any_version(warehouse: Warehouse) 
     of_log = [one for one in parameter_sets.get_all(warehouse, "mariner") if one.log_ids == (other.log_id,)]
     assert of_log and {rerun(warehouse, one.parameter_set_id).verdict for one in of_log} == {"bit-identical"}
     assert not reprocess_vessel(warehouse, "mariner").failures
-    standing = parameter_sets.get_all(warehouse, "mariner", history.standing(warehouse, "mariner"))
+    standing = parameter_sets.get_all(warehouse, "mariner", standing_ids(warehouse, "mariner"))
     assert standing and all(one.log_ids == (other.log_id,) for one in standing)
     counted = verify_all(warehouse)
     every = parameter_sets.get_all(warehouse, "mariner")

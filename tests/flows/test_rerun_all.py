@@ -26,7 +26,6 @@ from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.code import code_version
-from kempf.warehouse.queries import history
 from kempf.warehouse.storage import delta
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import equivalents, examinations, logs, parameter_sets, provenance, runs, segments
@@ -278,7 +277,7 @@ def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Wareho
     def sets() -> list[str]:
         return [one.parameter_set_id for one in parameter_sets.get_all(own, "mariner")]
 
-    before, standing = sets(), history.standing(own, "mariner")
+    before, standing = sets(), standing_sets(own, "mariner")
     other_code(monkeypatch)
     assert said_of_vessel(own, "mariner") is not None
     with pytest.raises(KempfError) as caught:
@@ -289,7 +288,7 @@ def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Wareho
     assert said_of_vessel(own, "mariner") is None
     report = reprocess_vessel(own, "mariner")
     assert (report.status, report.reread, report.searched, report.new_sets) == ("unchanged", 0, 0, 0)
-    assert sets() == before and history.standing(own, "mariner") == standing
+    assert sets() == before and standing_sets(own, "mariner") == standing
     (same,) = preview_all(own)
     assert (same.sets, same.up_to_date) == (2, 2)
     # what comes goes on under the fingerprint of the code before, and says which code made it

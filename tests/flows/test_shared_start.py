@@ -18,7 +18,7 @@ from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.comparable import comparable_sets
 from kempf.warehouse.queries.deduplicate import once
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import parameter_sets, segments
@@ -97,7 +97,7 @@ def test_they_are_pooled_and_compared_and_what_is_left_out_is_said(tank: Warehou
     comparison = compare_vessel(tank, "mariner")
     assert len(comparison.runs) == 3 and len(comparison.skipped) == 1
     assert {run.held_out for run in comparison.runs} == {False, True}
-    (kind,) = (one for one in history.comparable(tank, "mariner") if one.estimator == "ml")
+    (kind,) = (one for one in comparable_sets(tank, "mariner") if one.estimator == "ml")
     assert len(kind.parameter_set_ids) == 3
     assert kind.left_out == {"of a manoeuvre that another log holds": 1}
 

@@ -17,7 +17,7 @@ from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage import delta
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import logs, parameter_sets, segments
@@ -110,19 +110,17 @@ def test_a_formula_of_segment_leaves_the_readings_and_finds_segments_anew(source
     assert logs.current(found.warehouse) == logs.current(before)
     (new,), (old,) = segments.current(found.warehouse), segments.current(before)
     assert new.segment_id == old.segment_id and new.code_version != old.code_version
-    assert history.standing(found.warehouse, "mariner") == history.standing(before, "mariner") != []
+    assert standing_ids(found.warehouse, "mariner") == standing_ids(before, "mariner") != []
 
 
 def test_a_set_goes_with_its_segment_and_comes_back_with_it(source: Source, tmp_path: Path) -> None:
     limit = ("largest_heading_deg: float = 45.0\n", "largest_heading_deg: float = 9.0\n")
     found = source.reprocess(tmp_path / "w", pipeline__segment__settings=limit)
     assert found.done == (0, 1, 0, 0) and segments.current(found.warehouse) == []
-    assert history.standing(found.warehouse, "mariner") == []
+    assert standing_ids(found.warehouse, "mariner") == []
     report = reprocess_vessel(found.warehouse, "mariner")
     assert (report.reread, report.searched, report.new_sets, report.kept_sets) == (0, 1, 0, 1)
-    assert history.standing(found.warehouse, "mariner") == history.standing(
-        Warehouse(str(source.identified)), "mariner"
-    )
+    assert standing_ids(found.warehouse, "mariner") == standing_ids(Warehouse(str(source.identified)), "mariner")
 
 
 def test_a_formula_of_estimate_leaves_readings_and_segments(source: Source, tmp_path: Path) -> None:
@@ -132,7 +130,7 @@ def test_a_formula_of_estimate_leaves_readings_and_segments(source: Source, tmp_
     now, then = versions(tmp_path / "w"), versions(source.identified)
     assert {name for name in now if now[name] != then[name]} == {"parameter_sets"}
     assert len(parameter_sets.codes(found.warehouse, "mariner")) == 2
-    assert len(history.standing(found.warehouse, "mariner")) == 1, "each version stands by its own set"
+    assert len(standing_ids(found.warehouse, "mariner")) == 1, "each version stands by its own set"
 
 
 def test_a_formula_of_ingest_reads_anew(source: Source, tmp_path: Path) -> None:

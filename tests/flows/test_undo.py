@@ -16,7 +16,7 @@ from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.state.former_vessel import former_vessels
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, logs, notes, parameter_sets, raw, segments, vessels
 from tests.conftest import Ship
@@ -44,7 +44,7 @@ def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
 
 
 def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _filled: Path) -> None:
-    before = history.standing(warehouse, "mariner")
+    before = standing_ids(warehouse, "mariner")
     first = next(row for row in logs.current(warehouse) if row.format == "mcap")
     stated = of_logs(warehouse, [first])
     assert len(stated.segment_ids) == 1 and stated.set_ids and set(stated.set_ids) <= set(before)
@@ -52,7 +52,7 @@ def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _fille
     assert found == stated
     assert first.log_id not in {row.log_id for row in logs.current(warehouse)}
     assert first.log_id not in {one.log_id for one in segments.every(warehouse, "mariner")}
-    assert not set(found.set_ids) & set(history.standing(warehouse, "mariner"))
+    assert not set(found.set_ids) & set(standing_ids(warehouse, "mariner"))
     (gone,) = logs.removed(warehouse)
     assert gone.removed == "a trial of another draught" and gone.revision == first.revision + 1
     # nothing was rewritten: her sets are there, and the vessel is due
@@ -67,7 +67,7 @@ def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _fille
     back = restore(warehouse, first.log_id[:10])
     assert (back.ingest_id, back.removed, back.revision) == (first.ingest_id, None, first.revision + 2)
     reprocess_vessel(warehouse, "mariner")
-    assert history.standing(warehouse, "mariner") == before
+    assert standing_ids(warehouse, "mariner") == before
     with pytest.raises(UsageError, match="blank"):
         remove(warehouse, [first], " ")
 

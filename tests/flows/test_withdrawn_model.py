@@ -22,7 +22,7 @@ from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, logs, parameter_sets, segments, vessels
 from kempf.warehouse.tables.logs import LogRow
@@ -155,7 +155,7 @@ def test_of_a_log_and_its_beginning_one_pooled_set_stands(warehouse: Warehouse) 
 
     early, late = pooled("cut", "other"), pooled("whole", "other")
     parameter_sets.insert(warehouse, [early])
-    assert early.parameter_set_id in history.standing(warehouse, "aurora")
+    assert early.parameter_set_id in standing_ids(warehouse, "aurora")
     parameter_sets.insert(warehouse, [late])
-    standing = history.standing(warehouse, "aurora")
+    standing = standing_ids(warehouse, "aurora")
     assert late.parameter_set_id in standing and early.parameter_set_id not in standing

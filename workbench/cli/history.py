@@ -74,6 +74,7 @@ def command(
     """
     from kempf.flows.jobs.state.out_of_date import said_of_vessel
     from kempf.warehouse.queries import history
+    from kempf.warehouse.queries.comparable import comparable_sets
     from kempf.warehouse.storage.store import Warehouse
     from kempf.warehouse.tables import vessels
     from kempf.workbench.documents.changes import changes_document, examined
@@ -99,7 +100,7 @@ def command(
                 _say_which_fit(warehouse, histories)
             _show_notes(warehouse, list(histories), instant)
         return
-    kinds = {name: history.comparable(warehouse, name, instant) for name in histories}
+    kinds = {name: comparable_sets(warehouse, name, instant) for name in histories}
     # each kind of sets has a figure of its own
     figures = iter(require_figures(figure, sum(map(len, kinds.values()))))
     documents = []

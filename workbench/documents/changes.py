@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.warehouse.queries.history import Comparable, History
+from kempf.warehouse.queries.comparable import Comparable
+from kempf.warehouse.queries.history import History
 
 if TYPE_CHECKING:
     from kempf.pipeline.history.changes import Changes
@@ -55,7 +56,7 @@ def examined(kind: Comparable, occasion_h: float | None = None) -> Examined:
     Parameters
     ----------
     kind : Comparable
-        See `kempf.warehouse.queries.history.comparable`.
+        See `kempf.warehouse.queries.comparable.comparable_sets`.
     occasion_h : float, optional
         Trials begun within so many hours count as one, by default as `ChangeSettings` says.
     """

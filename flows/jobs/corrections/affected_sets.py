@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, parameter_sets, segments
 from kempf.warehouse.tables.logs import LogRow
@@ -63,7 +63,7 @@ def _affected(
     log_ids: Collection[str],
     segment_ids: Collection[str],
 ) -> Affected:
-    held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    held = parameter_sets.get_all(warehouse, vessel, standing_ids(warehouse, vessel))
     superseded = [
         parameter_set.parameter_set_id
         for parameter_set in held

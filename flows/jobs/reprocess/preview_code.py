@@ -21,7 +21,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.warehouse.code import code_version
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.canonical import canonical_json, plain
 from kempf.warehouse.storage.keys import ingest_id
 from kempf.warehouse.storage.store import Warehouse
@@ -160,7 +160,7 @@ def _built_again(warehouse: Warehouse, old: Sequence[ParameterSet]) -> dict[str,
 
 def standing_sets(warehouse: Warehouse, vessel: str) -> list[ParameterSet]:
     """Return the parameter sets of a vessel that are not superseded, by start, then id."""
-    return parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    return parameter_sets.get_all(warehouse, vessel, standing_ids(warehouse, vessel))
 
 
 @contextmanager

@@ -30,7 +30,7 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, parameter_sets, segments
 from kempf.warehouse.tables.equivalents import code_of
@@ -311,7 +311,7 @@ def _first_model(warehouse: Warehouse, vessel: str) -> ModelSpec:
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> str | None:
     """Withdraw ``current`` where its set is of a profile or code that no longer stands; return where it points now."""
     pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    if pointed is None or pointed in history.standing(warehouse, vessel):
+    if pointed is None or pointed in standing_ids(warehouse, vessel):
         return pointed
     aliases.withdraw(warehouse, vessel)
     report.withdrawn = pointed

@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.quality import Kind
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import examinations, logs, parameter_sets, segments
 from kempf.warehouse.tables.equivalents import code_of
@@ -47,7 +47,7 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
         ``no_warehouse``, ``no_vessel``.
     """
     manoeuvres = segments.found_in(warehouse, vessel)
-    standing = {name: place for place, name in enumerate(history.standing(warehouse, vessel))}
+    standing = {name: place for place, name in enumerate(standing_ids(warehouse, vessel))}
     sets = parameter_sets.convergences(warehouse, vessel, names=list(standing))
     sets.sort(key=lambda row: standing[row.parameter_set_id])
     return [*_of_logs(warehouse, vessel, manoeuvres), *_of_sets(sets)]

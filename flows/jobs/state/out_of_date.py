@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from kempf.flows.jobs.state.withdrawn_set import why_withdrawn
 from kempf.schemas.enumeration import counted
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, corrections, examinations, logs, parameter_sets, vessels
 from kempf.warehouse.tables.equivalents import code_of
@@ -84,7 +84,7 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
         commands = [*dict.fromkeys([*commands * bool(parts), *helping])]
         said.append(f"no parameter set is current, since {why}")
     # of other code every set is superseded, which is said already
-    elif current is not None and not old and current not in history.standing(warehouse, vessel):
+    elif current is not None and not old and current not in standing_ids(warehouse, vessel):
         said.append(
             f"the current parameter set {current} is superseded: her logs, her manoeuvres or the code have changed "
             "since it was made"

@@ -260,11 +260,12 @@ def next_trial(work: Work) -> dict[str, Any]:
 def history_changes(work: Work) -> dict[str, Any]:
     """Put a vessel's parameters to the tests; the result is what `kempf history --changes --json` prints."""
     from kempf.warehouse.queries import history
+    from kempf.warehouse.queries.comparable import comparable_sets
     from kempf.workbench.documents.changes import changes_document, examined
 
     vessel, as_of = work.arguments["vessel"], work.arguments["as_of"]
     then = end_of(as_of, "as_of") if as_of else None
-    kinds = history.comparable(work.warehouse, vessel, then)
+    kinds = comparable_sets(work.warehouse, vessel, then)
     changes = []
     for done, kind in enumerate(kinds):
         work.progress(done, len(kinds), f"testing the sets of model {kind.model}, {kind.estimator}")

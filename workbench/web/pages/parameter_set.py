@@ -7,7 +7,7 @@ from typing import Any
 from kempf.flows.jobs.identify.chosen_set import named_set
 from kempf.flows.jobs.identify.leg_fit import by_name
 from kempf.flows.jobs.state.out_of_date import said_of_sets
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.app_state import AppState
 from kempf.workbench.web.draw.correlation import draw_correlation
@@ -36,7 +36,7 @@ def gather(app_state: AppState, set_id: str) -> Page:
             ("Discrete, eq. (17)", parameter_set.discrete),
         ),
         "converged": bool(parameter_set.convergence.get("converged")),
-        "standing": parameter_set.parameter_set_id in set(history.standing(app_state.warehouse, parameter_set.vessel)),
+        "standing": parameter_set.parameter_set_id in set(standing_ids(app_state.warehouse, parameter_set.vessel)),
         "stale": said_of_sets(app_state.warehouse, [parameter_set]),
         "correlation": draw_correlation(parameter_set.covariance_names, parameter_set.covariance),
     }

@@ -7,7 +7,7 @@ from typing import Any
 from kempf.flows.jobs.corrections.notes_of_hers import notes_of_hers
 from kempf.flows.jobs.identify.standing_model import POOLED, WITH_EFFECTS
 from kempf.flows.jobs.state.out_of_date import said_of_vessel
-from kempf.warehouse.queries import history
+from kempf.warehouse.queries.standing import standing_ids
 from kempf.warehouse.tables import aliases, diagnoses
 from kempf.workbench.documents.logs import listed_logs
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres, logs_begin_alike
@@ -30,7 +30,7 @@ def gather(app_state: AppState, vessel: str) -> Page:
     """Return the page of a vessel."""
     warehouse = app_state.warehouse
     sets = listed_sets(warehouse, vessel)
-    standing = set(history.standing(warehouse, vessel))
+    standing = set(standing_ids(warehouse, vessel))
     manoeuvres = listed_manoeuvres(warehouse, vessel).documents
     over_time = changes.content(app_state, vessel, {}) if sets else {}
     content = {
