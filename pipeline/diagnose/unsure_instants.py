@@ -21,10 +21,11 @@ from types import MappingProxyType
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.nuisance import columns_of, orthonormal
 from kempf.pipeline.estimate.agreement import agreement_of
+from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.sensitivity import difference
@@ -89,7 +90,7 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     shared, m = covariance.shape[0], std_s.size
     across, own, score = np.zeros((shared, parts)), np.zeros((m, parts)), np.zeros(m)
     first = 0
-    for filtered, line in zip(fit.runs, fit.linearised, strict=True):
+    for number, (filtered, line) in enumerate(zip(fit.runs, fit.linearised, strict=True)):
         log, part = filtered.run.day, slice(first, first + line.u.size)
         first += line.u.size
         # every log is late by itself: what others are late by is nothing to this run
@@ -98,7 +99,7 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
             continue
         column = np.column_stack([one.column[part] for one in late if log in one.std_s])
         common, levels = columns_of(line, shared)
-        basis = orthonormal(levels)
+        basis = orthonormal(levels[:, _unbound(fit, number, line.u @ levels)])
         column = column - basis @ (basis.T @ column)
         free = at[at < m]
         across[np.ix_(np.array([i for i in line.index if i < shared], dtype=np.intp), at)] += common.T @ column
@@ -115,6 +116,21 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     considered = to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]
     added: Float = to_hull[:, :m] @ late_covariance @ to_hull[:, :m].T + considered @ considered.T
     return WithInstants(replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high)), added)
+
+
+def _unbound(fit: PooledFit, number: int, score: Float) -> Mask:
+    """Return which noise levels of a run are unknown in the covariance of a fit: not those pressed against a bound.
+
+    Parameters
+    ----------
+    score : ndarray
+        Slope of the log-likelihood by each level that the run has.
+    """
+    filtered = fit.runs[number]
+    used = filtered.levels_used()
+    at, least, most = (levels[used] for levels in (fit.levels[number], *level_bounds(filtered.spec)))
+    pressed: Mask = ((at <= least) & (score < 0.0)) | ((at >= most) & (score > 0.0))
+    return ~pressed
 
 
 def within_rows(fit: PooledFit, effect: Effect) -> bool:

@@ -12,6 +12,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose import unsure_instants
 from kempf.pipeline.diagnose.unsure_instants import with_instants, within_rows
 from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
@@ -150,11 +151,14 @@ def test_instants_of_rows_follow_a_lateness_that_is_only_considered() -> None:
     assert row.logs == smoothed.logs == [0]
     parts = []
     first = 0
-    for filtered, line in zip(unsure.runs, unsure.linearised, strict=True):
+    least, most = level_bounds(ship.spec)
+    for filtered, line, at in zip(unsure.runs, unsure.linearised, unsure.levels, strict=True):
         late = [one.column[first : first + line.u.size] * (filtered.run.day == 0) for one in (row, smoothed)]
         own = np.column_stack([line.J, *late])
         levels = [k for k, i in enumerate(line.index) if i >= 6]
-        basis = np.linalg.qr(own[:, levels])[0]
+        # one at its bound is known, as in the covariance of the fit
+        unknown = [k for k in levels if least[line.index[k] - 6] < at[line.index[k] - 6] < most[line.index[k] - 6]]
+        basis = np.linalg.qr(own[:, unknown])[0]
         parts.append((own - basis @ (basis.T @ own))[:, [k for k in range(own.shape[1]) if k not in levels]])
         first += line.u.size
     J = np.concatenate(parts)
