@@ -21,7 +21,7 @@ from tests.workbench.driving import START, environment
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 BROWSER = os.environ.get("KEMPF_CHROMIUM") or next((found for name in BROWSERS if (found := shutil.which(name))), None)
 NEEDS_BROWSER = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; KEMPF_CHROMIUM names one")
-WAIT_MS = 120_000
+WAIT_MS = 300_000
 
 
 @dataclass
