@@ -146,8 +146,37 @@ def take_inbox(
     before = inbox.below(warehouse, folder.address)
     folders = _read_folders(folder, files)
     register = Register(vessels.profiles(warehouse), folders.profiles, new_vessels, former_vessels(warehouse))
-    settled_ns = time.time_ns() - round(settle_s * 1e9)
-    waiting, due = [], []
+    logs_in_it, waiting = _logs_in(files, folders, settled_ns=time.time_ns() - round(settle_s * 1e9))
+    due = [_placed(register, file) for file in logs_in_it]
+    todo = [arrival for arrival in due if arrival.is_new(before.get(arrival.file.address))]
+    _log.info(
+        "inbox %s: %d files to look at, %d known, %d left for the next run",
+        *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
+    )
+    rows = [*folders.rows(before), *_gone(files, before)]
+    if before and inbox.was_empty(folder.address, before) == bool(files):
+        rows.append(inbox.emptied(folder.address, empty=not files))
+    taken, outcomes = _take_all(warehouse, folder, todo, rows, progress)
+    _register(warehouse, folders.profiles)
+    held = [row for row in inbox.below(warehouse, folder.address).values() if row.outcome == "quarantined"]
+    tried = {arrival.file.address for arrival in todo} | {file.address for file, _ in folders.unreadable.values()}
+    return InboxRun(
+        folder.address,
+        outcomes,
+        tuple(sorted(held, key=lambda row: row.address)),
+        frozenset(tried),
+        waiting,
+        len(due) - len(todo),
+        tuple(row for row in taken if row.outcome == "removed"),
+        tuple(remarks(folder.address, listing, before)),
+    )
+
+
+def _logs_in(
+    files: Sequence[SourceFile], folders: _Folders, settled_ns: int
+) -> tuple[list[SourceFile], tuple[str, ...]]:
+    """Return what of an inbox may be a log, and the paths of what is left for the next run: see `InboxRun.waiting`."""
+    ready, waiting = [], []
     bags = {_beside_what(file) for file in files if file.name.endswith(_OF_BAGS)}
     for file in files:
         if file.address in folders.files or (file.name == _BAG_DESCRIPTION and _beside_what(file) in bags):
@@ -155,42 +184,34 @@ def take_inbox(
         if file.folder in folders.unreadable or file.modified_utc_ns > settled_ns:
             waiting.append(file.path)
         else:
-            due.append(_placed(register, file))
-    todo = [arrival for arrival in due if arrival.is_new(before.get(arrival.file.address))]
-    _log.info(
-        "inbox %s: %d files to look at, %d known, %d left for the next run",
-        *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
-    )
-    rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
-    if before and inbox.was_empty(folder.address, before) == bool(files):
-        rows.append(inbox.emptied(folder.address, empty=not files))
-    removed: list[InboxFile] = []
+            ready.append(file)
+    return ready, tuple(waiting)
+
+
+def _take_all(
+    warehouse: Warehouse, folder: SourceFolder, todo: Sequence[Placed], beside: Sequence[InboxFile], progress: Progress
+) -> tuple[list[InboxFile], tuple[IngestOutcome, ...]]:
+    """Ingest files, and record what became of them with the rows that are to be recorded in any case, some at a time.
+
+    Returns
+    -------
+    (list of InboxFile, tuple of IngestOutcome)
+        A row of each file, and what was ingested.
+    """
+    rows, taken, outcomes = list(beside), [], []
     for done, arrival in enumerate(todo):
         progress(done, len(todo), f"reading {arrival.file.name}")
         row, outcome = take(warehouse, folder, arrival)
+        taken.append(row)
         rows.append(row)
-        if row.outcome == "removed":
-            removed.append(row)
         if outcome is not None:
             outcomes.append(outcome)
         if len(rows) >= _TOGETHER:
             inbox.record(warehouse, rows)
             rows = []
     inbox.record(warehouse, rows)
-    _register(warehouse, folders.profiles)
     progress(len(todo), len(todo), "done")
-    held = [row for row in inbox.below(warehouse, folder.address).values() if row.outcome == "quarantined"]
-    tried = {arrival.file.address for arrival in todo} | {file.address for file, _ in folders.unreadable.values()}
-    return InboxRun(
-        folder.address,
-        tuple(outcomes),
-        tuple(sorted(held, key=lambda row: row.address)),
-        frozenset(tried),
-        tuple(waiting),
-        len(due) - len(todo),
-        tuple(removed),
-        tuple(remarks(folder.address, listing, before)),
-    )
+    return taken, tuple(outcomes)
 
 
 def _beside_what(file: SourceFile) -> str:
