@@ -13,7 +13,7 @@ import yaml
 
 from benchmarks import result_page
 from benchmarks.baselines.mmg_standard import Peer
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 
 _FILE = Path(__file__).parents[1] / "peers" / "kvlcc2.yaml"
 _RUDDER_RAD = radians(35.0)
@@ -61,7 +61,7 @@ def overshoots(heading_deg: float, rudder_deg: float, side: str, rudder_rate_rad
     return ", ".join(f"{x:.3g}" for x in peer.overshoots_deg(radians(heading_deg), radians(rudder_deg), sign))
 
 
-def circles_beside(predicted: Callable[[str, float], PredictedManoeuvre]) -> list[str]:
+def circles_beside(predicted: Callable[[str, float], SetPrediction]) -> list[str]:
     """Return the part of the page with circles of both sides.
 
     Parameters

@@ -29,7 +29,7 @@ from kempf.flows.jobs.predict.as_sailed import as_sailed
 from kempf.flows.jobs.predict.checked_prediction import predict_checked
 from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre, beside, measured_beside
 from kempf.flows.jobs.predict.predict_request import PredictRequest
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
@@ -163,7 +163,7 @@ def _calm_circle(warehouse: Warehouse, vessel: str, source: Source, *, others: b
         "",
     ]
 
-    def elsewhere(side: Any, rudder_rate_deg_s: float) -> PredictedManoeuvre:
+    def elsewhere(side: Any, rudder_rate_deg_s: float) -> SetPrediction:
         request = PredictRequest("turning-circle", source.set_id, side=side, rudder_rate_deg_s=rudder_rate_deg_s)
         return predict_checked(warehouse, vessel, request)
 

@@ -21,7 +21,7 @@ from kempf.workbench.terminal import print_json, print_paragraph, print_table, p
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.predict.compare_predicted import ComparedFigure, MeasuredManoeuvre
-    from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+    from kempf.flows.jobs.predict.predicted import SetPrediction
     from kempf.pipeline.manoeuvre.prediction import PredictedFigure
 
 
@@ -111,7 +111,7 @@ def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | Non
         raise UsageError("usage", f"A {manoeuvre} has no --angles.", "Give its rudder with --rudder.")
 
 
-def _title(predicted: PredictedManoeuvre) -> str:
+def _title(predicted: SetPrediction) -> str:
     manoeuvre = predicted.as_json()["manoeuvre"]
     kind = manoeuvre["kind"].replace("-", " ")
     words = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
@@ -124,7 +124,7 @@ def _title(predicted: PredictedManoeuvre) -> str:
     )
 
 
-def _print_predicted(predicted: PredictedManoeuvre, figure: Path | None) -> None:
+def _print_predicted(predicted: SetPrediction, figure: Path | None) -> None:
     shown = predicted.as_json()
     manoeuvre = shown["manoeuvre"]
     scale = predicted.basis.particulars.model_scale
@@ -172,7 +172,7 @@ def _with_half(beside: ComparedFigure) -> str:
     return number(beside.measured) + ("" if low is None or high is None else f" ± {number(0.5 * (high - low), 2)}")
 
 
-def _print_models(predicted: PredictedManoeuvre) -> None:
+def _print_models(predicted: SetPrediction) -> None:
     first = next(iter(predicted.prediction.figures))
     words, unit = FIGURES[first.partition(".")[0]]
     rows = []

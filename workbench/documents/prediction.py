@@ -8,7 +8,7 @@ from typing import Any
 
 from kempf.flows.jobs.predict.compare_predicted import MeasuredManoeuvre
 from kempf.flows.jobs.predict.one_sided import OneSided, one_sided
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.pipeline.segment.particulars import Particulars
 from kempf.workbench.manoeuvre_figures import in_words, scaled
 
@@ -65,7 +65,7 @@ def sentence_of(found: OneSided) -> str:
 
 
 def prediction_document(
-    predicted: PredictedManoeuvre,
+    predicted: SetPrediction,
     measured: Sequence[MeasuredManoeuvre] | None,
     others: Mapping[str, int],
     figure: str | None = None,

@@ -30,7 +30,7 @@ from kempf.warehouse.tables.segments import Segment
 
 
 @dataclass(frozen=True, eq=False)
-class Levels:
+class BoundLevels:
     """Noise levels of one run."""
 
     #: foreseen, own: Shape (6,), logarithms: to predict with, and fitted to the run itself.
@@ -48,7 +48,7 @@ class BoundRun:
     segment: Segment
     #: Whether the parameters have not seen it.
     held_out: bool
-    levels: Levels
+    levels: BoundLevels
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,7 +173,7 @@ def _is_seen(segment: Segment, seen: _Seen) -> bool:
 
 def _levels(
     filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet
-) -> list[Levels]:
+) -> list[BoundLevels]:
     """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
     set_levels: Mapping[str, Any] = chosen.convergence.get("levels") or {}
     own, sources = [], []
@@ -188,9 +188,9 @@ def _levels(
     fitted_levels = [levels for levels, out in zip(own, held, strict=True) if not out]
     mean = np.mean(fitted_levels, axis=0) if fitted_levels else None
     return [
-        Levels(levels, levels, words)
+        BoundLevels(levels, levels, words)
         if mean is None or not out
-        else Levels(
+        else BoundLevels(
             mean,
             levels,
             "mean of the fitted ones' logarithms; in where: fitted to this manoeuvre, parameters held",

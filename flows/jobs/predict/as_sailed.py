@@ -14,7 +14,7 @@ from kempf.flows.jobs.identify.lasting_noise import with_lasting_noise
 from kempf.flows.jobs.identify.loads_of_logs import loads_beside
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.log_channels import channels_of
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.flows.jobs.predict.prediction_basis import Basis
 from kempf.flows.jobs.predict.spiral_ways import orders_of
 from kempf.flows.process.progress import Progress, silent
@@ -86,7 +86,7 @@ class AsSailed:
 
 def as_sailed(
     warehouse: Warehouse,
-    predicted: PredictedManoeuvre,
+    predicted: SetPrediction,
     pairs: Sequence[tuple[Segment, Manoeuvre]],
     progress: Progress = silent,
 ) -> list[AsSailed]:
@@ -111,7 +111,7 @@ def as_sailed(
 
 
 def _one(
-    predicted: PredictedManoeuvre,
+    predicted: SetPrediction,
     manoeuvre: Manoeuvre,
     segment: Segment,
     log: Instruments,
@@ -139,7 +139,7 @@ def _one(
     )
 
 
-def _usual_wind(predicted: PredictedManoeuvre) -> tuple[float, float]:
+def _usual_wind(predicted: SetPrediction) -> tuple[float, float]:
     """Return no wind force, with the root mean square of those that the filter finds in the manoeuvres of the set.
 
     A manoeuvre on which the set is not fitted has a wind of its own, from any side. What wanders about the steady force
@@ -165,7 +165,7 @@ class _Logs:
 
 
 def _runs(
-    warehouse: Warehouse, predicted: PredictedManoeuvre, zigzags: list[Segment], progress: Progress
+    warehouse: Warehouse, predicted: SetPrediction, zigzags: list[Segment], progress: Progress
 ) -> dict[str, RunFilter]:
     """Return every zigzag whose log can be used, by its id, under the model of the set."""
     chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in zigzags}
@@ -188,14 +188,14 @@ def _runs(
     return {run.name: RunFilter(run, model, basis.runs.spec) for run in runs}
 
 
-def _with_its_noise(predicted: PredictedManoeuvre) -> EffectModel:
+def _with_its_noise(predicted: SetPrediction) -> EffectModel:
     """Return the model of a set with the lasting noise that was found with it."""
     model = predicted.prediction.models[0].model.waters.model
     return with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))[0]
 
 
 def _beside_the_set(
-    warehouse: Warehouse, predicted: PredictedManoeuvre, chosen: Chosen, progress: Progress
+    warehouse: Warehouse, predicted: SetPrediction, chosen: Chosen, progress: Progress
 ) -> tuple[GridRun, ...]:
     """Return runs of further manoeuvres as those of the set are: profile, step, slip and load on the set's scale."""
     basis, parameter_set = predicted.basis, predicted.parameter_set
@@ -233,7 +233,7 @@ def _as_ordered(manoeuvre: Manoeuvre, segment: Segment) -> Manoeuvre:
     return replace(manoeuvre, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 
-def _passed(run: RunFilter, predicted: PredictedManoeuvre) -> Passed | None:
+def _passed(run: RunFilter, predicted: SetPrediction) -> Passed | None:
     """Return a manoeuvre passed through the filter of the set, None for a set without noise levels."""
     levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
     if not levels:

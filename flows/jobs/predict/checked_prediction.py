@@ -11,7 +11,7 @@ from kempf.flows.jobs.predict.as_sailed import AsSailed
 from kempf.flows.jobs.predict.compare_predicted import beside, figures_of, own_zigzags
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre, limits_of
+from kempf.flows.jobs.predict.predicted import SetPrediction, limits_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.conditioned import OwnZigzag, conditioned
@@ -25,7 +25,7 @@ _FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 
 def predict_checked(
     warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent
-) -> PredictedManoeuvre:
+) -> SetPrediction:
     """Predict a manoeuvre, and the first two overshoots of every zigzag of the vessel to see what the errors miss.
 
     Parameters and errors are those of `kempf.flows.jobs.predict.predict_vessel.models_of_set`.
@@ -49,7 +49,7 @@ class CheckedPredictions:
         self._set_models = models_of_set(warehouse, vessel, request, progress)
         self._checks: dict[tuple[str, ...], _Check] = {}
 
-    def predict(self, request: PredictRequest, progress: Progress = silent, count: int = DRAWS) -> PredictedManoeuvre:
+    def predict(self, request: PredictRequest, progress: Progress = silent, count: int = DRAWS) -> SetPrediction:
         """Predict one, see `predict_checked`; set and speed are those of the first request."""
         predicted = predict_with(self._set_models, request, progress, count)
         # a model whose ships do not sail the manoeuvre is left out, of the check too
@@ -77,7 +77,7 @@ class _Check:
     models: tuple[Identified, ...] = ()
 
 
-def _check(warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progress) -> _Check:
+def _check(warehouse: Warehouse, predicted: SetPrediction, progress: Progress) -> _Check:
     zigzags = own_zigzags(warehouse, predicted, progress)
     own = _overshoots(predicted, zigzags)
     before = held_against(_rows(own), len(zigzags))
@@ -95,7 +95,7 @@ def _check(warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progre
     return _Check(after, models)
 
 
-def _brought(model: Identified, predicted: PredictedManoeuvre, zigzags: Sequence[AsSailed]) -> Identified:
+def _brought(model: Identified, predicted: SetPrediction, zigzags: Sequence[AsSailed]) -> Identified:
     measured = []
     for zigzag in zigzags:
         figures = {name: value for name, value in figures_of(zigzag.segment).items() if name in _FIRST_TWO}
@@ -103,12 +103,12 @@ def _brought(model: Identified, predicted: PredictedManoeuvre, zigzags: Sequence
     return conditioned(model, measured)
 
 
-def _with_models(predicted: PredictedManoeuvre, changed: Callable[[Identified], Identified]) -> PredictedManoeuvre:
+def _with_models(predicted: SetPrediction, changed: Callable[[Identified], Identified]) -> SetPrediction:
     models = tuple(replace(member, model=changed(member.model)) for member in predicted.prediction.models)
     return replace(predicted, prediction=replace(predicted.prediction, models=models))
 
 
-def _overshoots(predicted: PredictedManoeuvre, zigzags: Sequence[AsSailed]) -> dict[tuple[str, str], list[float]]:
+def _overshoots(predicted: SetPrediction, zigzags: Sequence[AsSailed]) -> dict[tuple[str, str], list[float]]:
     """Return measured, predicted and the ends of the interval, by zigzag and figure."""
     overshoots: dict[tuple[str, str], list[float]] = {}
     for manoeuvre in (beside(predicted, zigzag) for zigzag in zigzags):

@@ -8,7 +8,7 @@ from math import degrees, hypot, radians
 from typing import Any
 
 from kempf.flows.jobs.predict.as_sailed import AsSailed, as_sailed
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.flows.jobs.predict.spiral_ways import SAME_ORDER_DEG, rates_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure, predict
@@ -94,7 +94,7 @@ class MeasuredManoeuvre:
 
 
 def measured_beside(
-    warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progress = silent
+    warehouse: Warehouse, predicted: SetPrediction, progress: Progress = silent
 ) -> tuple[MeasuredManoeuvre, ...]:
     """Lay the prediction over the measured manoeuvres of the same kind and angles, to both sides.
 
@@ -114,13 +114,13 @@ def measured_beside(
     return tuple(beside(predicted, sailed) for sailed in every)
 
 
-def measured_kind(warehouse: Warehouse, predicted: PredictedManoeuvre) -> int:
+def measured_kind(warehouse: Warehouse, predicted: SetPrediction) -> int:
     """Return how many manoeuvres of the kind of a prediction were measured."""
     kind = _KINDS[type(predicted.prediction.manoeuvre)]
     return sum(segment.kind == kind for segment in segments.every(warehouse, predicted.vessel))
 
 
-def other_orders(warehouse: Warehouse, predicted: PredictedManoeuvre) -> dict[str, int]:
+def other_orders(warehouse: Warehouse, predicted: SetPrediction) -> dict[str, int]:
     """Return how many manoeuvres of the same kind `measured_beside` leaves out, by the option that predicts them."""
     manoeuvre = predicted.prediction.manoeuvre
     counts: dict[str, int] = {}
@@ -132,7 +132,7 @@ def other_orders(warehouse: Warehouse, predicted: PredictedManoeuvre) -> dict[st
     return dict(sorted(counts.items()))
 
 
-def own_zigzags(warehouse: Warehouse, predicted: PredictedManoeuvre, progress: Progress = silent) -> list[AsSailed]:
+def own_zigzags(warehouse: Warehouse, predicted: SetPrediction, progress: Progress = silent) -> list[AsSailed]:
     """Return all zigzags of the vessel, whatever their angles, with their first two overshoots."""
     every = [s for s in segments.current(warehouse, predicted.vessel) if s.kind == "zigzag"]
     pairs = [(s, PredictedZigzag(radians(s.psi0_deg), radians(s.delta0_deg), overshoots=2)) for s in every]
@@ -149,7 +149,7 @@ def _same_order(segment: Segment, manoeuvre: Manoeuvre) -> bool:
     return same or isinstance(manoeuvre, PredictedSpiral)
 
 
-def beside(predicted: PredictedManoeuvre, sailed: AsSailed) -> MeasuredManoeuvre:
+def beside(predicted: SetPrediction, sailed: AsSailed) -> MeasuredManoeuvre:
     """Lay a prediction over one manoeuvre."""
     segment, basis = sailed.segment, predicted.basis
     models = [sailed.on_the_day(each.model, basis) for each in predicted.prediction.models]

@@ -15,7 +15,7 @@ import numpy as np
 from kempf.flows.jobs.compare.bound_runs import BoundRuns, bound
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre
+from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
@@ -95,7 +95,7 @@ class NextTrial:
     #: The best first.
     trials: tuple[ProposedZigzag, ...]
     #: Of the best by the set's model and those that fit as well.
-    predicted: PredictedManoeuvre
+    predicted: SetPrediction
     #: What was taken for granted, sentences.
     remarks: tuple[str, ...]
 
@@ -259,7 +259,7 @@ def _rank(trial: ProposedZigzag, parameter: str | None) -> tuple[float, float]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Model:
+class _TrialModel:
     """A model of the ship, ready to sail and to be filtered over what another one sails."""
 
     identified: Identified
@@ -279,13 +279,13 @@ class _Model:
         return replace(filtered, run=as_predicted(filtered, self.point))
 
 
-def _model(bound_runs: BoundRuns, identified: Identified) -> _Model:
+def _model(bound_runs: BoundRuns, identified: Identified) -> _TrialModel:
     covariance = covariance_of(bound_runs.parameter_set, bound_runs.names)
     index = np.flatnonzero(np.diag(covariance) > 0.0)
     levels: Float = np.mean(
         [each.levels.own for each in bound_runs.runs if not each.held_out] or [bound_runs.runs[0].levels.own], axis=0
     )
-    return _Model(
+    return _TrialModel(
         identified,
         max((each.filtered for each in bound_runs.runs), key=lambda each: each.run.measured.shape[0]),
         Point(bound_runs.hull, bound_runs.values, levels),
@@ -300,7 +300,11 @@ def _names_of_ship(model: Identified) -> tuple[str, ...]:
 
 
 def _trial(
-    angles: tuple[float, float], models: Sequence[_Model], sailed_rad: float, parameter: str | None, of_ship: list[str]
+    angles: tuple[float, float],
+    models: Sequence[_TrialModel],
+    sailed_rad: float,
+    parameter: str | None,
+    of_ship: list[str],
 ) -> ProposedZigzag | None:
     """Return what one zigzag is worth; None where the ship of the first model cannot sail it.
 

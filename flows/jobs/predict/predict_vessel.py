@@ -11,7 +11,7 @@ from kempf.flows.jobs.diagnose.rival_models import rivals_of
 from kempf.flows.jobs.identify.chosen_set import chosen_set
 from kempf.flows.jobs.identify.parameter_set_of import CHANNELS_OF
 from kempf.flows.jobs.predict.predict_request import PredictRequest, manoeuvre_of, required
-from kempf.flows.jobs.predict.predicted import PredictedManoeuvre, assumed_by, limits_of
+from kempf.flows.jobs.predict.predicted import SetPrediction, assumed_by, limits_of
 from kempf.flows.jobs.predict.prediction_basis import Basis, basis_of, identified
 from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.flows.process.progress import Progress, silent
@@ -74,7 +74,7 @@ def models_of_set(
 
 def predict_with(
     set_models: ModelsOfSet, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
-) -> PredictedManoeuvre:
+) -> SetPrediction:
     """Predict a standard manoeuvre in calm, deep water with models that are there.
 
     Parameters
@@ -101,7 +101,7 @@ def predict_with(
     progress(1, 1, "sailed")
     assumed = (*assumed_by(request, basis, models, set_models.speed_m_s), *set_models.remarks)
     parameter_set = set_models.parameter_set
-    return PredictedManoeuvre(
+    return SetPrediction(
         set_models.vessel,
         parameter_set,
         basis,

@@ -31,8 +31,8 @@ _INSTRUMENTS = {"lateral_speed", "yaw_rate", "heading"}
 
 
 @dataclass(frozen=True, eq=False)
-class PredictedManoeuvre:
-    """What the job did."""
+class SetPrediction:
+    """A manoeuvre predicted from a parameter set, and what the prediction rests on."""
 
     vessel: str
     parameter_set: ParameterSet
