@@ -99,7 +99,7 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
             continue
         column = np.column_stack([one.column[part] for one in late if log in one.std_s])
         common, levels = columns_of(line, shared)
-        basis = orthonormal(levels[:, _unbound(fit, number, line.u @ levels)])
+        basis = orthonormal(levels[:, _unbound(fit, number)])
         column = column - basis @ (basis.T @ column)
         free = at[at < m]
         across[np.ix_(np.array([i for i in line.index if i < shared], dtype=np.intp), at)] += common.T @ column
@@ -118,17 +118,19 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     return WithInstants(replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high)), added)
 
 
-def _unbound(fit: PooledFit, number: int, score: Float) -> Mask:
+def _unbound(fit: PooledFit, number: int) -> Mask:
     """Return which noise levels of a run are unknown in the covariance of a fit: not those pressed against a bound.
 
-    Parameters
-    ----------
-    score : ndarray
-        Slope of the log-likelihood by each level that the run has.
+    Returns
+    -------
+    ndarray of bool
+        Of the levels that the linearised run has, in their order.
     """
-    filtered = fit.runs[number]
-    used = filtered.levels_used()
-    at, least, most = (levels[used] for levels in (fit.levels[number], *level_bounds(filtered.spec)))
+    line, shared = fit.linearised[number], fit.covariance.shape[0]
+    own = [i - shared for i in line.index if i >= shared]
+    at, least, most = (levels[own] for levels in (fit.levels[number], *level_bounds(fit.runs[number].spec)))
+    _, columns = columns_of(line, shared)
+    score = line.u @ columns
     pressed: Mask = ((at <= least) & (score < 0.0)) | ((at >= most) & (score > 0.0))
     return ~pressed
 

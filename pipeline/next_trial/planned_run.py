@@ -36,7 +36,7 @@ def planned(track: SailedTrack, ship: Ship, like: GridRun, spec: ModelSpec) -> G
 
     Parameters
     ----------
-    track : Track
+    track : SailedTrack
         Sailed by ``ship``.
     like : GridRun
         Of the same vessel.

@@ -167,7 +167,7 @@ class _Rests:
             self.segments |= before.segments
 
     def take_whole(self, doubles: Mapping[str, str]) -> None:
-        """Name every manoeuvre as the log holds it that has most of it, see `_twins`."""
+        """Name every manoeuvre as the log holds it that has most of it, see `LogsAsOf.twins`."""
         self.in_part = sum(name in doubles for name in self.segments)
         self.segments = frozenset(doubles.get(name, name) for name in self.segments)
 

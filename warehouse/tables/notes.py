@@ -228,7 +228,7 @@ def draughts_m(among: Sequence[Note], sailed: Iterable[LogStretch]) -> dict[str,
     ----------
     among : sequence of Note
         Of one vessel, in the order in which they were written.
-    sailed : iterable of Sailed
+    sailed : iterable of LogStretch
         Stretches of the logs that are asked for.
 
     Returns

@@ -24,7 +24,7 @@ def compared_sets(warehouse: Warehouse, first: ParameterSet, second: ParameterSe
     Returns
     -------
     dict
-        ``first``, ``second``; ``parameters``, see `parameter_set.compare`; ``nondimensional``, the same of the hull's
+        ``first``, ``second``; ``parameters``, see `tables.parameter_set.compare`; ``nondimensional``, the same of the hull's
         six without their dimension and of its K' = K L/V and T' = T V/L, by which ships of other sizes are compared;
         None where a profile states no length, or a set has no hull.
     """

@@ -142,7 +142,7 @@ def identify_segments(
     ----------
     refreshed : Refreshed
         What came of reading the logs anew.
-    new : Waiting
+    new : PendingSets
         Takes the new sets, and where ``current`` shall point.
     adopt : bool, optional
         Whether ``current`` may move to this model from another one.

@@ -46,7 +46,7 @@ def loads_beside(
 
     Parameters
     ----------
-    own, others : iterable of (str, Sailed)
+    own, others : iterable of (str, LogStretch)
         Stretches of the logs of the set, and of others.
     own_draughts_m, other_draughts_m : mapping of str to float
         By log, m, of those whose draught is known.

@@ -74,7 +74,7 @@ def pool_segments(
         What the segments were identified with.
     outcomes : sequence of IdentifyOutcome
         Of that job.
-    new : Waiting
+    new : PendingSets
         Takes the set where it is new, and where ``current`` shall point.
     adopt : bool, optional
         Whether ``current`` may move to this model from another one.

@@ -94,7 +94,7 @@ def as_sailed(
 
     Parameters
     ----------
-    predicted : Predicted
+    predicted : SetPrediction
         Whose set finds the wind of each zigzag, and the motion with which it began.
     pairs : sequence of (Segment, Manoeuvre)
         What was measured, and what of it is to be sailed.

@@ -105,7 +105,7 @@ def measured_beside(
 
     Parameters
     ----------
-    predicted : Predicted
+    predicted : SetPrediction
         Says which kind and angles.
     """
     manoeuvre = predicted.prediction.manoeuvre

@@ -44,7 +44,7 @@ def register_profiles(warehouse: Warehouse, outcome: Repaired) -> None:
 
 
 def _without_logs(warehouse: Warehouse, vessel: str, outcome: Repaired) -> set[str]:
-    """Let a vessel who is lost from the register, and of whose logs none counts, be what her logs tell that she was.
+    """Let a vessel who is lost from the register, and of whose logs none counts, be what her logs show she was.
 
     Where all of them went to one vessel she was renamed. Else nobody knows whether she was removed with her logs.
     Return her where she was registered.

@@ -28,7 +28,8 @@ def write(app_state: AppState, form: Mapping[str, str]) -> str:
     Raises
     ------
     UsageError
-        ``note_too_long``, ``instant_unreadable``, ``number_unreadable``; and what `notes.add` raises.
+        ``note_too_long``, ``instant_unreadable``, ``number_unreadable``; and what
+        `kempf.warehouse.tables.notes.add` raises.
     """
     text = form.get("text", "")
     if len(text) > MOST:
