@@ -13,7 +13,7 @@ import yaml
 from kempf.warehouse.tables.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.steering.ship_model import ShipOfSet
+    from kempf.flows.jobs.identify.ship_model import ShipOfSet
     from kempf.pipeline.steering.state_space import StateSpace
 
 #: bytes of the description at the head of a MAT file, which scipy fills with the time of day

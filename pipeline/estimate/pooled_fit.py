@@ -108,8 +108,8 @@ class PooledFit:
     #: Shape (runs, 6). Logarithms of the noise levels.
     levels: Float
     log_likelihood: float
-    #: Shape (6 + p, 6 + p). Of hull and effects, from the expected information with the levels unknown; NaN where a
-    #: bound is active.
+    #: Shape (6 + p, 6 + p). Of hull and effects, from the expected information with the levels unknown but for those
+    #: pressed against a bound; NaN where a bound of hull or effects is active.
     covariance: Float
     #: At the end, by the extended filter.
     linearised: tuple[Linearised, ...]

@@ -202,7 +202,7 @@ class Balance:
 
 @dataclass(frozen=True, eq=False)
 class SailedTrack:
-    """A manoeuvre as it was sailed."""
+    """A manoeuvre as the simulated ship sailed it."""
 
     #: Shape (n, 9). Columns of `kempf.pipeline.manoeuvre.motion`.
     rows: Float

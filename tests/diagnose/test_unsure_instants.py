@@ -101,6 +101,26 @@ def test_every_log_errs_by_itself() -> None:
     assert np.all(np.diag(added[0, 1].covariance) > np.diag(added[0,].covariance))
 
 
+def test_levels_pressed_against_a_bound_are_known() -> None:
+    """As the search has it: at a bound, and the likelihood rises beyond it."""
+    ship = sailed()
+    fit = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
+    (line, _), (least, most) = fit.linearised, level_bounds(ship.spec)
+    own = [i - 6 for i in line.index if i >= 6]
+    assert least[own[0]] < fit.levels[0, own[0]] < most[own[0]]
+    assert unsure_instants._unbound(fit, 0).all()
+    levels_columns = line.J[:, [k for k, i in enumerate(line.index) if i >= 6]]
+    for bound, outward in ((least, -1.0), (most, 1.0)):
+        levels = fit.levels.copy()
+        levels[0, own[0]] = bound[own[0]]
+        for slope, known in ((outward, True), (-outward, False)):
+            # innovations along the first column alone: its slope is that of the likelihood by its level
+            turned = replace(line, u=slope * levels_columns[:, 0])
+            at_bound = replace(fit, levels=levels, linearised=(turned, fit.linearised[1]))
+            found = unsure_instants._unbound(at_bound, 0)
+            assert found[0] == (not known) and found[1:].all()
+
+
 def test_a_latency_of_the_model_is_known_no_better_than_the_instants() -> None:
     ship = sailed("heading_latency")
     fit = ship.diagnosis(("heading_latency",)).steps[1].fit

@@ -15,13 +15,13 @@ from kempf.flows.jobs.corrections.remove_logs import move, rename_vessel
 from kempf.flows.jobs.diagnose.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.ship_model import ship_of_set
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, inputs_of
 from kempf.flows.jobs.identify.vessel_model import store_model
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_set import rerun
 from kempf.flows.jobs.state.vessel_state import fleet_state
-from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile

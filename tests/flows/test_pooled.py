@@ -12,6 +12,7 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.identify.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.identify.loads_of_logs import loads_beside
 from kempf.flows.jobs.identify.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.identify.ship_model import ship_of_set
 from kempf.flows.jobs.identify.standing_model import POOLED
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.files import read_profiles
@@ -23,7 +24,6 @@ from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.predict.prediction_basis import basis_of, identified
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_set import rerun
-from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag

@@ -288,6 +288,22 @@ def test_a_table_that_is_gone_and_a_raw_log_that_is_damaged(warehouse: Warehouse
     assert len(segments.current(warehouse)) == 2
 
 
+def test_what_could_not_be_read_again_is_tried_by_the_next_repair(warehouse: Warehouse) -> None:
+    wanted = content(warehouse)["readings"]
+    lose(warehouse, "readings")
+    (row,) = logs.current(warehouse, "ferry")
+    assert warehouse.folder is not None
+    kept = warehouse.folder / "raw" / row.log_id[:2] / row.log_id
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[:-10])
+    done = repair(warehouse)
+    assert any(words.startswith("the log of the ingest") for words in done.gone)
+    assert "damaged/unfinished.json" in {problem.where for problem in verify(warehouse)}
+    kept.write_bytes(whole)
+    assert repair(warehouse).left == [] and verify(warehouse) == []
+    assert content(warehouse)["readings"] == wanted
+
+
 def test_a_warehouse_in_which_all_is_well_is_left_alone(warehouse: Warehouse) -> None:
     assert kempf("verify", "--warehouse", warehouse.uri).out.strip() == "all is well"
     output = kempf("repair", "--warehouse", warehouse.uri)

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from kempf.flows.jobs.identify.leg_fit import fitted_to_legs
+from kempf.flows.jobs.identify.ship_model import ship_of_set
 from kempf.flows.jobs.identify.standing_model import standing
-from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import parameter_sets

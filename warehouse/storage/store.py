@@ -1,6 +1,6 @@
 """The place where everything is kept: a folder, or a bucket reached by the same code.
 
-Knows addresses and bytes; the tables themselves are opened in `warehouse.delta`. A folder becomes a warehouse by its
+Knows addresses and bytes; the tables themselves are opened in `delta`. A folder becomes a warehouse by its
 marker file, which also says how it is laid out.
 """
 

@@ -1,1 +1,1 @@
-"""Tables made smaller, brought to a later layout, and checked."""
+"""Tables compacted, brought to a later layout, erased in part, and verified."""

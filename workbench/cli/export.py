@@ -186,8 +186,8 @@ def _only(comparison: Comparison, beginnings: Sequence[str]) -> Comparison:
 
 def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | None, step: float, course: float) -> Any:
     from kempf.flows.jobs.identify.chosen_set import named_set
+    from kempf.flows.jobs.identify.ship_model import ship_of_set
     from kempf.flows.jobs.state.out_of_date import said_of_sets
-    from kempf.flows.jobs.steering.ship_model import ship_of_set
     from kempf.warehouse.storage.store import Warehouse
     from kempf.workbench.export import linear
 

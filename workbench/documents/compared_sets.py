@@ -24,9 +24,9 @@ def compared_sets(warehouse: Warehouse, first: ParameterSet, second: ParameterSe
     Returns
     -------
     dict
-        ``first``, ``second``; ``parameters``, see `tables.parameter_set.compare`; ``nondimensional``, the same of the hull's
-        six without their dimension and of its K' = K L/V and T' = T V/L, by which ships of other sizes are compared;
-        None where a profile states no length, or a set has no hull.
+        ``first``, ``second``; ``parameters``, see `tables.parameter_set.compare`; ``nondimensional``, the same of the
+        hull's six without their dimension and of its K' = K L/V and T' = T V/L, by which ships of other sizes are
+        compared; None where a profile states no length, or a set has no hull.
     """
     here, there = (
         without_dimension(parameter_set, _length_m(warehouse, parameter_set)) for parameter_set in (first, second)

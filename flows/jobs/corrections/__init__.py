@@ -1,1 +1,1 @@
-"""What a person says of logs and manoeuvres: removed, moved, purged, corrected, noted."""
+"""What a person changes afterwards: logs and vessels removed, moved, renamed or purged, manoeuvres corrected, notes."""

@@ -1,1 +1,1 @@
-"""From manoeuvres to parameter sets."""
+"""From manoeuvres to parameter sets, and which set of a vessel is meant."""

@@ -41,7 +41,7 @@ class SetRequest:
     #: Provenance.
     origin: dict[str, Any]
     parent: str | None = None
-    #: The set that it brings forward, whole; see `warehouse.parameter_set.ParameterSet.updates`.
+    #: The set that it brings forward, whole; see `ParameterSet.updates`.
     before: ParameterSet | None = None
 
     @property

@@ -10,10 +10,10 @@ from dataclasses import dataclass, replace
 from kempf.flows.jobs.diagnose.rival_models import rivals_of
 from kempf.flows.jobs.identify.chosen_set import chosen_set
 from kempf.flows.jobs.identify.parameter_set_of import CHANNELS_OF
+from kempf.flows.jobs.identify.ship_model import ship_of_set
 from kempf.flows.jobs.predict.predict_request import PredictRequest, manoeuvre_of, required
 from kempf.flows.jobs.predict.predicted import SetPrediction, assumed_by, limits_of
 from kempf.flows.jobs.predict.prediction_basis import Basis, basis_of, identified
-from kempf.flows.jobs.steering.ship_model import ship_of_set
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.prediction import predict

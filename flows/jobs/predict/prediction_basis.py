@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.identify.loads_of_logs import loads_of_logs
+from kempf.flows.jobs.identify.ship_model import ShipOfSet
 from kempf.flows.jobs.identify.vessel_runs import LENGTH_M, Like, VesselRuns, assemble
 from kempf.flows.jobs.ingest.log_channels import channels_of
-from kempf.flows.jobs.steering.ship_model import ShipOfSet
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter

@@ -1,1 +1,1 @@
-"""Damaged and earlier warehouses."""
+"""Damaged warehouses made whole, earlier ones brought to the layout of this version."""

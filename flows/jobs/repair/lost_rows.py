@@ -34,7 +34,15 @@ _AFTER = {
 
 
 def say_lost(what: str, name: str, outcome: Repaired) -> None:
-    """Say that rows of a table are lost that no log gives again."""
+    """Say that rows of a table are lost that no log gives again.
+
+    Parameters
+    ----------
+    what : str
+        How much is lost, such as "2 rows of the table notes".
+    name : str
+        Key of `kempf.schemas.tables.TABLES`.
+    """
     outcome.names |= name == "aliases"
     outcome.vessels |= name == "vessels"
     if name == "parameter_sets":

@@ -60,7 +60,10 @@ def take_in(warehouse: Warehouse, name: str) -> str:
 def unread_ingests(warehouse: Warehouse, outcome: Repaired, taken_in: Collection[str]) -> list[str]:
     """Return the ingests of which something that the bytes gave is missing, and that the present code has read.
 
-    Logs that were taken in again just now are whole.
+    Parameters
+    ----------
+    taken_in : collection of str
+        Ids of logs that were taken in again just now: they are whole.
     """
     code = code_of(warehouse, "ingest")
     held = delta.distinct(warehouse, "readings", "ingest_id")
@@ -82,7 +85,13 @@ def unread_ingests(warehouse: Warehouse, outcome: Repaired, taken_in: Collection
 
 
 def read_again(warehouse: Warehouse, name: str) -> str:
-    """Read the log of an ingest again and put all that its bytes give in place of what is stored of it."""
+    """Read the log of an ingest again and put all that its bytes give in place of what is stored of it.
+
+    Raises
+    ------
+    KempfError
+        ``other_ingest``: the present code, or another profile, makes another ingest of it.
+    """
     row = logs.of_ingest(warehouse, name)
     profile = vessels.get(warehouse, row.profile_sha256)
     log_corrections = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())

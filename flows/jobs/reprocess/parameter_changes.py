@@ -85,7 +85,7 @@ def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> PairedSe
 
     Returns
     -------
-    Paired
+    PairedSets
         Moves sorted by `Move.size`, the largest first.
     """
     closeness = sorted(

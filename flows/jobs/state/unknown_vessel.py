@@ -9,7 +9,15 @@ from kempf.schemas.errors import NotFound
 
 
 def no_vessel(name: str, known: Iterable[str], next_step: str) -> NotFound:
-    """Return the error of a name that is no vessel's."""
+    """Return the error of a name that is no vessel's.
+
+    Parameters
+    ----------
+    known : iterable of str
+        Names of vessels.
+    next_step : str
+        What to do about it, a sentence.
+    """
     names = sorted(known)
     like = get_close_matches(name, names)
     hint = f"; like it: {', '.join(map(repr, like))}" if like else f"; known: {', '.join(names[:20]) or 'none'}"

@@ -9,7 +9,7 @@ from math import degrees, isfinite, nan, radians
 import numpy as np
 
 from kempf.flows.jobs.identify.chosen_set import chosen_set, named_set
-from kempf.flows.jobs.steering.ship_model import ShipOfSet, ship_of_set
+from kempf.flows.jobs.identify.ship_model import ShipOfSet, ship_of_set
 from kempf.flows.jobs.steering.steered_ship import SteeredShip
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import Environment

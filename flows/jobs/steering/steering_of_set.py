@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.jobs.identify.chosen_set import named_set
-from kempf.flows.jobs.steering.ship_model import ShipOfSet, ship_of_set
+from kempf.flows.jobs.identify.ship_model import ShipOfSet, ship_of_set
 from kempf.pipeline.estimate.result import Value
 from kempf.pipeline.steering.motion import linear_hull
 from kempf.pipeline.steering.nomoto import Constant, Nomoto, nomoto
@@ -67,7 +67,7 @@ def steering_of_set(
     Raises
     ------
     NotFound, UsageError, DataRejected
-        As `kempf.flows.jobs.identify.chosen_set.named_set` and `kempf.flows.jobs.steering.ship_model.ship_of_set`.
+        As `kempf.flows.jobs.identify.chosen_set.named_set` and `kempf.flows.jobs.identify.ship_model.ship_of_set`.
     """
     ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed_m_s)
     linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)

@@ -1,4 +1,4 @@
-"""A stored parameter set as `pipeline.steering` takes it: numbers with their covariance, and what had to be assumed."""
+"""A stored parameter set as predictions and steering take it: numbers, their covariance, and what had to be assumed."""
 
 from __future__ import annotations
 
