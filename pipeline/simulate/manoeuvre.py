@@ -119,7 +119,7 @@ class TurningCircle:
 
 
 @dataclass(frozen=True)
-class HoldRudder:
+class RudderHold:
     """Hold one rudder angle: amidships behind a turning circle it is a pull-out, many in a row are a spiral.
 
     Parameters
@@ -171,7 +171,7 @@ class HandSteering:
         return Steering(ORDERS, np.zeros(5), limited)
 
 
-Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | HoldRudder | HandSteering
+Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | RudderHold | HandSteering
 
 
 @dataclass(frozen=True)

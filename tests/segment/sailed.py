@@ -8,7 +8,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.simulate.disturbances import CALM, Environment
 from kempf.pipeline.simulate.hulls import HULLS
-from kempf.pipeline.simulate.manoeuvre import HoldRudder, Step
+from kempf.pipeline.simulate.manoeuvre import RudderHold, Step
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial
 from kempf.schemas.channels import CHANNELS
 
@@ -23,9 +23,9 @@ def sailed(
     )
 
 
-def direct_spiral(angles_deg: tuple[float, ...], hold_s: float) -> tuple[HoldRudder, ...]:
+def direct_spiral(angles_deg: tuple[float, ...], hold_s: float) -> tuple[RudderHold, ...]:
     """The steps of a direct spiral: angles from side to side, starboard positive, and back over the same ones."""
-    return tuple(HoldRudder(angle, hold_s) for angle in (*angles_deg, *angles_deg[-2::-1]))
+    return tuple(RudderHold(angle, hold_s) for angle in (*angles_deg, *angles_deg[-2::-1]))
 
 
 def instruments(trial: Trial, without: tuple[str, ...] = ()) -> Instruments:

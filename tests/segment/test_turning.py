@@ -20,7 +20,7 @@ from kempf.pipeline.segment.spiral import Spiral, SpiralPoint
 from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_circle import MeasuredCircle
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from kempf.pipeline.simulate.manoeuvre import HoldRudder, SteadyCourse
+from kempf.pipeline.simulate.manoeuvre import RudderHold, SteadyCourse
 from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
 from tests.segment.nomoto import Instruments, Ship, measure
@@ -120,7 +120,7 @@ def test_a_stable_ship_that_lags_behind_short_steps_has_no_loop(
 
 @pytest.mark.parametrize(("hull", "hold_s"), [("ferry", 220.0), ("mariner", 340.0), ("container", 320.0)])
 def test_the_rate_that_is_left_is_the_one_that_she_comes_to(hull: str, hold_s: float) -> None:
-    pull_out = HoldRudder(0.0, hold_s)
+    pull_out = RudderHold(0.0, hold_s)
     programme = (SteadyCourse(200.0), Turn(15.0, 400.0), pull_out, SteadyCourse(400.0), Turn(-15.0, 400.0), pull_out)
     trial = sailed((*programme, SteadyCourse(200.0)), hull, PAPER_ENVIRONMENT, seed=1)
     found = [one for one in find_circles_and_spirals(instruments(trial)) if isinstance(one, PullOut)]
@@ -264,7 +264,7 @@ def test_zigzags_are_not_touched_and_nothing_is_found_twice() -> None:
 
 
 def test_pull_outs_of_a_stable_ship_end_alike() -> None:
-    steps = [(SteadyCourse(300.0), Turn(side * 20.0, 400.0), HoldRudder(0.0, 200.0)) for side in (1.0, -1.0)]
+    steps = [(SteadyCourse(300.0), Turn(side * 20.0, 400.0), RudderHold(0.0, 200.0)) for side in (1.0, -1.0)]
     trial = sailed((*steps[0], *steps[1]), "ferry")
     found = find_circles_and_spirals(instruments(trial))
     assert [type(one) for one in found] == [MeasuredCircle, PullOut] * 2

@@ -10,7 +10,7 @@ import yaml
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
-from kempf.pipeline.simulate.manoeuvre import HoldRudder, SteadyCourse, TurningCircle, ZigzagTest
+from kempf.pipeline.simulate.manoeuvre import RudderHold, SteadyCourse, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import parameter_sets, segments
@@ -31,7 +31,7 @@ def taken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ran]:
             ZigzagTest(20.0, 20.0, legs=5),
             SteadyCourse(200.0, heading_deg=40.0),
             TurningCircle(-35.0, 560.0),
-            HoldRudder(0.0, 150.0),
+            RudderHold(0.0, 150.0),
             SteadyCourse(200.0),
             *direct_spiral(ANGLES, 140.0),
         ),

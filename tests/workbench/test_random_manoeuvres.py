@@ -11,7 +11,7 @@ import yaml
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
-from kempf.pipeline.simulate.manoeuvre import HoldRudder, SteadyCourse, ZigzagTest
+from kempf.pipeline.simulate.manoeuvre import RudderHold, SteadyCourse, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
 from kempf.workbench.web.jobs.queue import DONE
 from tests.workbench.driving import HULL, Ran, kempf
@@ -25,7 +25,7 @@ def taken(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Ran]:
     """A ferry's day: a zigzag, and rudder orders at irregular times behind it."""
     folder = tmp_path_factory.mktemp("day")
     held_s = np.random.default_rng(3).uniform(12.0, 40.0, len(ORDERS))
-    irregular = [HoldRudder(angle, float(time)) for angle, time in zip(ORDERS, held_s, strict=True)]
+    irregular = [RudderHold(angle, float(time)) for angle, time in zip(ORDERS, held_s, strict=True)]
     programme = (SteadyCourse(120.0), ZigzagTest(20.0, 20.0, legs=5), SteadyCourse(250.0), *irregular)
     settings = TrialSettings(HULLS["ferry"], (*programme, SteadyCourse(250.0)), seed=5)
     (folder / "day.csv").write_bytes(to_csv(simulate_trial(settings)))

@@ -88,6 +88,7 @@ def as_then(table: DeltaTable | None, name: str, vessel: str, where: Where, colu
     """Return rows of a vessel in some version of a table, which may have them under the key of before layout 4.
 
     One that was written while the table was brought forward has some under either key, and each of them once.
+    Parameters are those of `kempf.warehouse.storage.delta.rows`.
     """
     import polars as pl
 

@@ -55,6 +55,15 @@ def marked(table: DeltaTable | None, vessel: str, logs: LogsAsOf, columns: Seque
     this is so of a set that it brings forward; and where a pooled set of the same model and settings rests on all of
     its manoeuvres and more, or on the same ones as a log holds them that has more of them. A set that goes by noted
     draughts is superseded where others are noted now.
+
+    Parameters
+    ----------
+    table : DeltaTable or None
+        Of parameter sets, newest or of a time that is past; None has no rows.
+    logs : LogsAsOf
+        What is known of her logs, or was then.
+    columns : sequence of str
+        Of the table, to be returned beside the mark.
     """
     import polars as pl
 
