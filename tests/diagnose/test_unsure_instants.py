@@ -10,6 +10,7 @@ import pytest
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose import unsure_instants
+from kempf.pipeline.diagnose.nuisance import columns_of
 from kempf.pipeline.diagnose.unsure_instants import with_instants, within_rows
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds
@@ -109,13 +110,13 @@ def test_levels_pressed_against_a_bound_are_known() -> None:
     own = [i - 6 for i in line.index if i >= 6]
     assert least[own[0]] < fit.levels[0, own[0]] < most[own[0]]
     assert unsure_instants._unbound(fit, 0).all()
-    levels_columns = line.J[:, [k for k, i in enumerate(line.index) if i >= 6]]
+    _, by_level = columns_of(line, 6)
     for bound, outward in ((least, -1.0), (most, 1.0)):
         levels = fit.levels.copy()
         levels[0, own[0]] = bound[own[0]]
         for slope, known in ((outward, True), (-outward, False)):
             # innovations along the first column alone: its slope is that of the likelihood by its level
-            turned = replace(line, u=slope * levels_columns[:, 0])
+            turned = replace(line, u=slope * by_level[:, 0])
             at_bound = replace(fit, levels=levels, linearised=(turned, fit.linearised[1]))
             found = unsure_instants._unbound(at_bound, 0)
             assert found[0] == (not known) and found[1:].all()

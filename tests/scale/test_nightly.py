@@ -64,6 +64,11 @@ def flow_runs(*states: str) -> list[Any]:
         return [one for one in found if not states or (one.state and one.state.type.value in states)]
 
 
+def since(before: set[Any], *states: str) -> list[Any]:
+    """The flow runs that were not there before: the server also serves the other files of this session."""
+    return [one for one in flow_runs(*states) if one.id not in before]
+
+
 def planned() -> list[Any]:
     return [one for one in flow_runs("SCHEDULED") if one.auto_scheduled]
 
@@ -84,7 +89,7 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
     # The server's scheduler plans one deployment after another: 01:00 may stand before 02:00 does.
     wait_for(lambda: "02:00" in {f"{one.expected_start_time:%H:%M}" for one in planned()}, 120.0, every_s=0.5)
     pause_schedules()
-    before = {one.id for one in flow_runs()}  # the server also serves the other files of this session
+    before = {one.id for one in flow_runs()}
     sound, damaged = FLEET[:2], FLEET[2]
     touch(place, *FLEET)
     kept = raw_file(place, damaged)
@@ -95,7 +100,7 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
     finally:
         kept.write_bytes(whole)
     assert done.returncode == 1, done
-    (failed,) = [one for one in flow_runs("FAILED") if one.id not in before]
+    (failed,) = since(before, "FAILED")
     assert failed.state.message == f"3 vessels: 2 changed, 1 failed; look at {damaged}"
     stood = {run.vessel: run.status for run in runs.all_runs(place, "reprocess")}
     assert stood == {**dict.fromkeys(sound, "changed"), damaged: "failed"}
@@ -116,7 +121,7 @@ def test_a_cancelled_run_goes_on_where_it_stopped(deployed: dict[str, str], plac
     try:
         start("reprocess/nightly")
         wait_for(lambda: finished(place, states) == set(FLEET[1:]), 300.0, every_s=0.2)
-        (one,) = [r for r in flow_runs("RUNNING") if r.id not in before]
+        (one,) = since(before, "RUNNING")
         cancel(one.id)
         wait_for(lambda: let_go(kept) or not flow_runs("RUNNING", "CANCELLING"), 300.0, every_s=0.2)
     finally:
@@ -184,7 +189,7 @@ def test_the_schedule_starts_runs_by_itself(deployed: dict[str, str], place: War
         (made,) = client.create_deployment_schedules(deployment.id, [(soon, True)])
 
         def fired() -> list[Any]:
-            return [r for r in flow_runs("COMPLETED") if r.id not in before and r.auto_scheduled]
+            return [r for r in since(before, "COMPLETED") if r.auto_scheduled]
 
         wait_for(fired, 600.0, every_s=0.5)
         client.delete_deployment_schedule(deployment.id, made.id)
