@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
+from kempf.pipeline.segment.circles.turning_figures import TurningFigures, turning_figures
 
 _STEP_S = 0.05
 _LONGEST_S = 400.0

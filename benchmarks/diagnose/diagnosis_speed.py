@@ -18,7 +18,7 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.files import read_model, read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
-from kempf.pipeline.diagnose.screen import screen
+from kempf.pipeline.diagnose.screening.screen import screen
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec

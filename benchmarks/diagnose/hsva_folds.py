@@ -13,7 +13,7 @@ from benchmarks import measured_ships, result_page
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose_refreshed
 from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.jobs.ingest.files import read_model
-from kempf.pipeline.diagnose.improves_prediction import better_ahead
+from kempf.pipeline.diagnose.steps.improves_prediction import better_ahead
 from kempf.pipeline.shooting.ahead import shooting_range
 from kempf.schemas import effects
 from kempf.schemas.model_spec import ModelSpec

@@ -19,7 +19,7 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.files import read_model
-from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
+from kempf.pipeline.diagnose.screening.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise

@@ -19,8 +19,8 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose
 from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, known_effects
 from kempf.flows.jobs.identify.vessel_runs import assembled
-from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.steps.joint import better_together
 from kempf.pipeline.shooting.ahead import shooting_range
 from kempf.warehouse.storage.store import Warehouse
 

@@ -24,9 +24,9 @@ from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
-from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.diagnose.stretch import Explained, explain
-from kempf.pipeline.diagnose.stretch_json import verdict
+from kempf.pipeline.diagnose.screening.staged import staged
+from kempf.pipeline.diagnose.stretches.stretch import Explained, explain
+from kempf.pipeline.diagnose.stretches.stretch_json import verdict
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.logger_profile import logger_profile

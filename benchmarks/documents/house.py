@@ -25,7 +25,10 @@ BEFORE = "13ec8f7"
 PATHS = {
     "a sentence to a reading": ("pipeline.ingest.nmea.decode",),
     "the likelihood": ("pipeline.estimate.likelihood", "pipeline.identify.likelihood"),
-    "an effect screened and added": ("pipeline.diagnose.forward_selection", "pipeline.diagnose.staged"),
+    "an effect screened and added": (
+        "pipeline.diagnose.screening.forward_selection",
+        "pipeline.diagnose.screening.staged",
+    ),
 }
 
 Sources = Mapping[str, str]

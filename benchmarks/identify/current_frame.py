@@ -19,7 +19,7 @@ import numpy as np
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.pipeline.segment.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

@@ -15,8 +15,8 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from tests.segment.loading import available, load
 
 SOURCES = {

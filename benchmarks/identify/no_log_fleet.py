@@ -18,7 +18,7 @@ from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, sh
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings, identify_without_log
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.segment.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
 from kempf.schemas.model_spec import ModelSpec
 from tests.reading import read_log
 

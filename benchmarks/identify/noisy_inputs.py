@@ -24,7 +24,7 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.signal import Signal
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate import agreement
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import get

@@ -24,7 +24,7 @@ from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
 from kempf.pipeline.channels.instant_errors import InstantErrors
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.unsure_instants import with_instants
+from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.predict.free_run import free_run_of

@@ -24,7 +24,7 @@ from kempf.flows.jobs.identify.update_model import FEWEST, GROWN
 from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of

@@ -85,11 +85,11 @@ def trap_rows(data: Path) -> list[list[str]]:
 
 
 def _mends(fault: dict[str, object]) -> tuple[object, ...]:
-    from kempf.pipeline.channels.doctor.corrections import Correction
+    from kempf.pipeline.channels.doctor.corrections import ProfileCorrection
 
     entries = fault["entries"]
     assert isinstance(entries, dict)
-    return tuple(Correction(key, ChannelMap.model_validate(entry)) for key, entry in entries.items())
+    return tuple(ProfileCorrection(key, ChannelMap.model_validate(entry)) for key, entry in entries.items())
 
 
 def with_faults(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float, float]:

@@ -46,7 +46,7 @@ def ours(path: Path) -> int:
 def raw(path: Path) -> int:
     """Find every message, unpacked and checked, without looking into it."""
     from kempf.pipeline.ingest.log_file import LogFile
-    from kempf.pipeline.ingest.mcap.stream import McapStream
+    from kempf.pipeline.ingest.mcap.container.stream import McapStream
 
     with path.open("rb") as stream:
         return sum(batch.first.size for batch in McapStream(path.name, LogFile(stream)).batches())

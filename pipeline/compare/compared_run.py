@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.comparison import ComparedRun
-from kempf.pipeline.compare.overshoot import Turn, compare_overshoots
+from kempf.pipeline.compare.overshoot import StoredOvershoot, compare_overshoots
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.sensitivity import Point
@@ -28,7 +28,7 @@ def compare_run(
     levels_from: str = "fitted with the parameters",
     own_levels: Float | None = None,
     phases: Sequence[PhaseInterval] = (),
-    turns: Sequence[Turn] = (),
+    turns: Sequence[StoredOvershoot] = (),
 ) -> ComparedRun:
     """Compare one run with its prediction.
 
@@ -44,7 +44,7 @@ def compare_run(
     own_levels : ndarray, shape (6,), optional
         Logarithms of levels fitted to this run, for the search for misfits; by default those of ``point``: a noisier
         sensor is no misfit.
-    turns : sequence of Turn, optional
+    turns : sequence of StoredOvershoot, optional
         Its overshoots.
 
     Raises

@@ -16,7 +16,7 @@ from kempf.pipeline.channels.series import Float
 
 
 @dataclass(frozen=True)
-class Turn:
+class StoredOvershoot:
     """One overshoot as the segment has it, times from the first instant of the run."""
 
     number: int
@@ -42,7 +42,7 @@ class OvershootError:
 
 
 def compare_overshoots(
-    time_s: Float, measured: Float, predicted: Float, turns: Sequence[Turn]
+    time_s: Float, measured: Float, predicted: Float, turns: Sequence[StoredOvershoot]
 ) -> tuple[OvershootError, ...]:
     """Compare the overshoots of a run.
 
@@ -68,7 +68,7 @@ def compare_overshoots(
     return tuple(errors)
 
 
-def _gain(time: Float, heading: Float, turn: Turn) -> float | None:
+def _gain(time: Float, heading: Float, turn: StoredOvershoot) -> float | None:
     """Return what the heading gains from the execute to its turning point, rad; None where it does not turn back."""
     inside = np.flatnonzero((time > turn.execute_s) & (time < turn.until_s))
     if inside.size < 3:
@@ -89,7 +89,7 @@ def _gain(time: Float, heading: Float, turn: Turn) -> float | None:
 
 def turns_of(
     overshoots: Sequence[tuple[int, int, float, float]], executes_s: Sequence[float], end_s: float
-) -> tuple[Turn, ...]:
+) -> tuple[StoredOvershoot, ...]:
     """Return the overshoots with the executes between which they lie.
 
     Parameters
@@ -104,5 +104,5 @@ def turns_of(
         before = [t for t in executes_s if t < peak_s]
         if before:
             after = [t for t in executes_s if t > peak_s]
-            turns.append(Turn(number, side, max(before), min([*after, end_s]), overshoot_deg))
+            turns.append(StoredOvershoot(number, side, max(before), min([*after, end_s]), overshoot_deg))
     return tuple(turns)

@@ -15,7 +15,7 @@ from kempf.schemas.units import TO_SI
 
 if TYPE_CHECKING:
     from kempf.pipeline.ingest.delimited import Titled
-    from kempf.pipeline.ingest.mcap.fields import Fields
+    from kempf.pipeline.ingest.mcap.topics.fields import Fields
 
 #: channel and the unit that loggers mostly write it in, by what its column is called; the first that fits
 _NAMES: tuple[tuple[str, str, str], ...] = (

@@ -63,7 +63,7 @@ class LogFile:
 
     def part(self, start: int, stop: int) -> LogFile:
         """Return the bytes between two places as a log of its own, which reads from this one."""
-        return self if (start, stop) == (0, self.size) else _Part(self, start, stop)
+        return self if (start, stop) == (0, self.size) else _LogPart(self, start, stop)
 
     @cached_property
     def sha256(self) -> str:
@@ -74,7 +74,7 @@ class LogFile:
         return digest.hexdigest()
 
 
-class _Part(LogFile):
+class _LogPart(LogFile):
     """Some bytes of a log that follow each other."""
 
     def __init__(self, log: LogFile, start: int, stop: int) -> None:

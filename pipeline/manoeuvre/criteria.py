@@ -13,8 +13,8 @@ from kempf.pipeline.manoeuvre.covered import Beyond
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
-from kempf.pipeline.segment.imo import overshoot_limits
 from kempf.pipeline.segment.particulars import SLOWEST_SHARE, Particulars
+from kempf.pipeline.segment.zigzags.imo import overshoot_limits
 from kempf.schemas.enumeration import listed
 
 #: in ship lengths: 5.3.1 and 5.3.2

@@ -15,7 +15,7 @@ import numpy as np
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Reach, Sailed, reach_of, thinned
 from kempf.pipeline.manoeuvre.ship import Balance, SailedTrack, Ship, Start
-from kempf.pipeline.segment.turning_figures import turning_figures
+from kempf.pipeline.segment.circles.turning_figures import turning_figures
 
 #: a ship that takes longer for a whole circle, in ship lengths on the approach, does not turn
 LONGEST = 400.0

@@ -9,7 +9,8 @@ data analysis using generalized linear models", Biometrika 73; information by sq
 Hausman 1974, "Estimation and inference in nonlinear structural models", Annals of Economic and Social Measurement 3).
 
 Of a log whose instants are not quite known every leg pulls the same way, and as far as they are known that is in the
-covariance already (`kempf.pipeline.diagnose.unsure_instants`): of such a log only the scatter of its legs counts.
+covariance already (`kempf.pipeline.diagnose.screening.unsure_instants`): of such a log only the scatter of its legs
+counts.
 """
 
 from __future__ import annotations

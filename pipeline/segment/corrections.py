@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from kempf.schemas.correction import Action, Bounds, Correction
 from kempf.schemas.errors import DataRejected
 
@@ -94,7 +94,7 @@ def applied(
     standings : sequence of Standing
         `standing` of its corrections.
     between : callable
-        Describes the zigzag between two bounds, `kempf.pipeline.segment.by_hand.zigzag_between`.
+        Describes the zigzag between two bounds, `kempf.pipeline.segment.zigzags.by_hand.zigzag_between`.
 
     Returns
     -------

@@ -11,14 +11,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
-from kempf.pipeline.segment.measured import Signals
-from kempf.pipeline.segment.pull_out import PullOut, paired, pull_out
+from kempf.pipeline.segment.circles.turning_circle import MeasuredCircle, turning_circle
+from kempf.pipeline.segment.circles.turns import find_turns, regions
+from kempf.pipeline.segment.rudder.held_rudder import HeldRudder, held_stretches
+from kempf.pipeline.segment.rudder.measured import Signals
 from kempf.pipeline.segment.settings import STANDARD
-from kempf.pipeline.segment.spiral import Spiral, find_spirals
-from kempf.pipeline.segment.turning_circle import MeasuredCircle, turning_circle
-from kempf.pipeline.segment.turns import find_turns, regions
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.spirals.pull_out import PullOut, paired, pull_out
+from kempf.pipeline.segment.spirals.spiral import Spiral, find_spirals
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 
 #: Smallest turn about which circles, pull-outs and spirals are looked for, rad.
 _SMALLEST_TURN_RAD = float(np.pi / 3)

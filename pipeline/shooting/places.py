@@ -19,8 +19,8 @@ _PARTS = ("least", "middle", "most")
 
 
 @dataclass(frozen=True)
-class Place:
-    """A part of the windows."""
+class MisfitPart:
+    """A part of the windows, and how much of the misfit it holds."""
 
     #: ``manoeuvre``, ``leg``, ``rudder``, ``yaw_rate`` or ``drift``.
     by: str
@@ -49,9 +49,9 @@ class Places:
     #: Part of it in v, r and psi; NaN where not measured.
     channels: tuple[float, float, float]
     #: Every part of every cut.
-    places: tuple[Place, ...]
+    places: tuple[MisfitPart, ...]
 
-    def most(self, *by: str) -> Place | None:
+    def most(self, *by: str) -> MisfitPart | None:
         """Return the place of these cuts that holds most beyond its part of the windows; None where none stands out."""
         there = (place for place in self.places if place.by in by and place.stands_out)
         return max(there, key=lambda place: place.excess, default=None)
@@ -87,7 +87,7 @@ def places(windows: Sequence[Windows], errors: Sequence[Float]) -> Places | None
             rank = np.argsort(np.argsort(size, kind="stable"), kind="stable")
             cuts[by] = np.array(_PARTS)[rank * len(_PARTS) // size.size]
     groups = [
-        Place(by, str(name), float(np.sum(total[cut == name]) / np.sum(total)), float(np.mean(cut == name)))
+        MisfitPart(by, str(name), float(np.sum(total[cut == name]) / np.sum(total)), float(np.mean(cut == name)))
         for by, cut in cuts.items()
         for name in dict.fromkeys(cut.tolist())
     ]

@@ -9,7 +9,7 @@ import pytest
 
 from kempf.pipeline.compare.compared_run import compare_run
 from kempf.pipeline.compare.comparison import judged, summary
-from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
+from kempf.pipeline.compare.overshoot import StoredOvershoot, compare_overshoots, turns_of
 from kempf.pipeline.estimate.levels import fit_levels
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.horizon import horizon_of
@@ -31,12 +31,12 @@ def test_the_overshoot_is_what_the_heading_gains_after_the_execute() -> None:
     assert found.predicted_deg == pytest.approx(3.0 + found.error_deg)
     (same,) = compare_overshoots(TIME, swing(20.0), swing(20.0) + 0.3, [turn])
     assert same.error_deg == pytest.approx(0.0, abs=1e-9)
-    (port,) = compare_overshoots(TIME, -swing(20.0), -swing(18.0), [Turn(1, -1, 10.0, 50.0, 3.0)])
+    (port,) = compare_overshoots(TIME, -swing(20.0), -swing(18.0), [StoredOvershoot(1, -1, 10.0, 50.0, 3.0)])
     assert port.error_deg == pytest.approx(-2.0 * (1.0 - np.sqrt(0.5)), abs=0.01)
 
 
 def test_a_prediction_that_does_not_turn_back_has_no_overshoot() -> None:
-    turn = Turn(1, 1, 10.0, 40.0, 3.0)
+    turn = StoredOvershoot(1, 1, 10.0, 40.0, 3.0)
     (found,) = compare_overshoots(TIME, swing(20.0), np.deg2rad(0.5) * TIME, [turn])
     assert found.measured_deg == 3.0 and found.predicted_deg is None and found.error_deg is None
 
@@ -44,7 +44,7 @@ def test_a_prediction_that_does_not_turn_back_has_no_overshoot() -> None:
 def test_a_gap_in_the_measured_heading_is_bridged() -> None:
     measured = swing(20.0)
     measured[[5, 15, 30]] = np.nan
-    (found,) = compare_overshoots(TIME, measured, swing(20.0), [Turn(1, 1, 10.0, 50.0, 3.0)])
+    (found,) = compare_overshoots(TIME, measured, swing(20.0), [StoredOvershoot(1, 1, 10.0, 50.0, 3.0)])
     assert found.error_deg == pytest.approx(0.0, abs=0.01)
 
 
@@ -67,7 +67,7 @@ def test_the_summary_of_runs_keeps_the_samples_apart() -> None:
     point = Point(hull, np.zeros(0), levels_of())
     filtered = [sailed_by_model(run_of(trial, QUIET, f"seg-{k}"), hull, seed=k, scale=k) for k in (1, 2, 3)]
     runs = [
-        compare_run(one, point, horizon_of("10s"), held_out=k == 2, turns=[Turn(1, 1, 60.0, 120.0, 5.0)])
+        compare_run(one, point, horizon_of("10s"), held_out=k == 2, turns=[StoredOvershoot(1, 1, 60.0, 120.0, 5.0)])
         for k, one in enumerate(filtered)
     ]
     shown = [run.as_json() for run in runs]

@@ -16,7 +16,7 @@ from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, HiddenEffect
 from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float, Series
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.simulate.hulls import SimulatedHull

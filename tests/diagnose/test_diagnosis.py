@@ -9,24 +9,24 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.by_likelihood import only_fitted
-from kempf.pipeline.diagnose.by_prediction import _stands
-from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.diagnosis_json import as_json
-from kempf.pipeline.diagnose.effect_finding import finding, refusal
-from kempf.pipeline.diagnose.forward_selection import added, is_ship
-from kempf.pipeline.diagnose.ladder import Ladder
-from kempf.pipeline.diagnose.ladder_step import Step
-from kempf.pipeline.diagnose.remainder import something_left
-from kempf.pipeline.diagnose.ridge_reference import ridge_reference_of
-from kempf.pipeline.diagnose.screen import Candidate, score
-from kempf.pipeline.diagnose.sentences import sentences
+from kempf.pipeline.diagnose.screening.forward_selection import added, is_ship
+from kempf.pipeline.diagnose.screening.ridge_reference import ridge_reference_of
+from kempf.pipeline.diagnose.screening.screen import Candidate, score
+from kempf.pipeline.diagnose.screening.staged import staged
+from kempf.pipeline.diagnose.screening.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.diagnose.unsure_instants import WithInstants
-from kempf.pipeline.diagnose.verdict import verdict
+from kempf.pipeline.diagnose.steps.by_likelihood import only_fitted
+from kempf.pipeline.diagnose.steps.by_prediction import _stands
+from kempf.pipeline.diagnose.steps.confirm import Confirmation, Unseen
+from kempf.pipeline.diagnose.steps.ladder import Ladder
+from kempf.pipeline.diagnose.steps.ladder_step import Step
+from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
+from kempf.pipeline.diagnose.verdicts.effect_finding import finding, refusal
+from kempf.pipeline.diagnose.verdicts.remainder import something_left
+from kempf.pipeline.diagnose.verdicts.sentences import sentences
+from kempf.pipeline.diagnose.verdicts.verdict import verdict
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.iteration import SILENT
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -399,7 +399,7 @@ def test_what_raced_in_vain_races_no_more(monkeypatch: pytest.MonkeyPatch) -> No
         raced.append((candidate.effect.name, race))
         return SimpleNamespace(likelihood_ratio=ratios[candidate.effect.name], outdone=False)
 
-    monkeypatch.setattr("kempf.pipeline.diagnose.ladder.confirm", confirmed)
+    monkeypatch.setattr("kempf.pipeline.diagnose.steps.ladder.confirm", confirmed)
     ladder = Ladder(None, {}, (), WORKERS, DiagnosisSettings(), SILENT, cast(PooledFit, None))
     alone = cast(Unseen, None)
     for base in (cast(PooledFit, object()), cast(PooledFit, object())):
@@ -436,7 +436,7 @@ def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(
 
     # the lag keeps several standard errors beside the dead time
     ship = sailed("dead_time", strength=1, seed=4)
-    monkeypatch.setattr("kempf.pipeline.diagnose.diagnosis.predicting_better", lag_first)
+    monkeypatch.setattr("kempf.pipeline.diagnose.verdicts.diagnosis.predicting_better", lag_first)
     found = ship.diagnosis(("rudder_lag", "dead_time"))
     (step,) = found.steps[1:]
     assert step.added is not None and step.added.name == "dead_time"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.added_variable import binned_means
-from kempf.pipeline.diagnose.unmodelled_acceleration import quartiles
+from kempf.pipeline.diagnose.evidence.added_variable import binned_means
+from kempf.pipeline.diagnose.evidence.unmodelled_acceleration import quartiles
 from kempf.pipeline.predict import smoothed_states
 from kempf.schemas.diagnosis_evidence import Quartiles, evidence_from_json
 

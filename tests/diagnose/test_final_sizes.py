@@ -9,11 +9,11 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.confirm import Confirmation
-from kempf.pipeline.diagnose.final_sizes import final_sizes, refitted_size
-from kempf.pipeline.diagnose.ladder_step import Step, without_members
-from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.diagnose.unsure_instants import with_instants
+from kempf.pipeline.diagnose.screening.staged import staged
+from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
+from kempf.pipeline.diagnose.steps.confirm import Confirmation
+from kempf.pipeline.diagnose.steps.final_sizes import final_sizes, refitted_size
+from kempf.pipeline.diagnose.steps.ladder_step import Step, without_members
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import get

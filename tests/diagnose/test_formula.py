@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.formula_search import search
-from kempf.pipeline.diagnose.ridge_reference import TERMS
+from kempf.pipeline.diagnose.screening.formula_search import search
+from kempf.pipeline.diagnose.screening.ridge_reference import TERMS
 
 
 def test_the_terms_that_made_the_force_are_proposed_with_their_sizes():

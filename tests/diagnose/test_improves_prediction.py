@@ -8,12 +8,12 @@ from typing import cast
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.by_prediction import _idle
-from kempf.pipeline.diagnose.immaterial import Weight
-from kempf.pipeline.diagnose.improves_prediction import better_ahead, falls, worsens
-from kempf.pipeline.diagnose.ladder import Ladder
-from kempf.pipeline.diagnose.ladder_step import Step
-from kempf.pipeline.diagnose.legs import in_std
+from kempf.pipeline.diagnose.steps.by_prediction import _idle
+from kempf.pipeline.diagnose.steps.immaterial import Weight
+from kempf.pipeline.diagnose.steps.improves_prediction import better_ahead, falls, worsens
+from kempf.pipeline.diagnose.steps.ladder import Ladder
+from kempf.pipeline.diagnose.steps.ladder_step import Step
+from kempf.pipeline.diagnose.steps.legs import in_std
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.pipeline.shooting.left_out import LeftOut

@@ -10,9 +10,9 @@ import pytest
 
 from benchmarks.diagnose.hidden_effects import programme
 from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
-from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
-from kempf.pipeline.diagnose.joint_noise import with_joint_noise
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.instrument_noise import with_instrument_noise
+from kempf.pipeline.diagnose.screening.joint_noise import with_joint_noise
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit, fit
@@ -93,7 +93,7 @@ def test_of_two_beginnings_the_higher_hill_is_taken(monkeypatch: pytest.MonkeyPa
         gain = 200.0 if begun[-1] == higher else 100.0
         return replace(plain, model=model, hull=hull, values=values, log_likelihood=plain.log_likelihood + gain)
 
-    monkeypatch.setattr("kempf.pipeline.diagnose.joint_noise.refitted", climbed)
+    monkeypatch.setattr("kempf.pipeline.diagnose.screening.joint_noise.refitted", climbed)
     made = with_joint_noise(plain, 15.0, WORKERS)
     assert begun == ["ship", "fit"]
     assert made.log_likelihood == plain.log_likelihood + 200.0
@@ -128,7 +128,7 @@ def test_a_climb_that_counts_for_nothing_stands_in_no_ones_way(monkeypatch, ship
         likely = plain.log_likelihood + gain + more
         return replace(plain, model=model, hull=hull, values=values, converged=there, log_likelihood=likely)
 
-    monkeypatch.setattr("kempf.pipeline.diagnose.joint_noise.refitted", climbed)
+    monkeypatch.setattr("kempf.pipeline.diagnose.screening.joint_noise.refitted", climbed)
     made = with_joint_noise(plain, 15.0, WORKERS)
     if taken is None:
         assert made is plain

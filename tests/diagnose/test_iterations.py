@@ -6,8 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.diagnose.screen import screen
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.screen import screen
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.schemas.effects import catalogue, get
 from tests.diagnose.heard import Heard
 from tests.diagnose.sailing import SOME, WORKERS, sailed

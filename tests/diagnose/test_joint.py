@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kempf.pipeline.diagnose.joint import _sets, _worth, better_together, kinds
+from kempf.pipeline.diagnose.steps.joint import _sets, _worth, better_together, kinds
 from kempf.pipeline.shooting.ahead import Ahead, shooting_range
 from kempf.pipeline.shooting.normal_equations import NormalEquations
 from kempf.schemas.effects import catalogue, get

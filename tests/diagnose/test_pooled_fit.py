@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.confirm import confirm, unseen
-from kempf.pipeline.diagnose.ladder_step import step_of
-from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.diagnose.screening.screen import score
+from kempf.pipeline.diagnose.steps.confirm import confirm, unseen
+from kempf.pipeline.diagnose.steps.ladder_step import step_of
 from kempf.pipeline.estimate import pooled_fit, sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.levels import first_levels

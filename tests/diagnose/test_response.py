@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose import effect_responses
-from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
-from kempf.pipeline.diagnose.effect_score import grid
-from kempf.pipeline.diagnose.ridge_reference import TERMS
+from kempf.pipeline.diagnose.screening import effect_responses
+from kempf.pipeline.diagnose.screening.effect_responses import EffectTrial, responses
+from kempf.pipeline.diagnose.screening.effect_score import grid
+from kempf.pipeline.diagnose.screening.ridge_reference import TERMS
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
 from kempf.pipeline.estimate.sensitivity import Point

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from kempf.pipeline.diagnose.screen import Candidate, score
+from kempf.pipeline.diagnose.screening.screen import Candidate, score
 from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise

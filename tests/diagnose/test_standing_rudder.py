@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.diagnose.screen import score
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.screen import score
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record import cut
 from kempf.schemas.effects import get

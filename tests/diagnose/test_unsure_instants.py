@@ -9,9 +9,9 @@ import pytest
 
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose import unsure_instants
-from kempf.pipeline.diagnose.nuisance import columns_of
-from kempf.pipeline.diagnose.unsure_instants import with_instants, within_rows
+from kempf.pipeline.diagnose.screening import unsure_instants
+from kempf.pipeline.diagnose.screening.nuisance import columns_of
+from kempf.pipeline.diagnose.screening.unsure_instants import with_instants, within_rows
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -108,9 +108,9 @@ def test_levels_pressed_against_a_bound_are_known() -> None:
     fit = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
     (line, _), (least, most) = fit.linearised, level_bounds(ship.spec)
     own = [i - 6 for i in line.index if i >= 6]
-    assert least[own[0]] < fit.levels[0, own[0]] < most[own[0]]
-    assert unsure_instants._unbound(fit, 0).all()
     _, by_level = columns_of(line, 6)
+    assert least[own[0]] < fit.levels[0, own[0]] < most[own[0]]
+    assert unsure_instants._unbound(fit, 0, line.u @ by_level).all()
     for bound, outward in ((least, -1.0), (most, 1.0)):
         levels = fit.levels.copy()
         levels[0, own[0]] = bound[own[0]]
@@ -118,7 +118,7 @@ def test_levels_pressed_against_a_bound_are_known() -> None:
             # innovations along the first column alone: its slope is that of the likelihood by its level
             turned = replace(line, u=slope * by_level[:, 0])
             at_bound = replace(fit, levels=levels, linearised=(turned, fit.linearised[1]))
-            found = unsure_instants._unbound(at_bound, 0)
+            found = unsure_instants._unbound(at_bound, 0, turned.u @ by_level)
             assert found[0] == (not known) and found[1:].all()
 
 

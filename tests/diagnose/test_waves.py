@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnose.hidden_effects import programme, sail
-from kempf.pipeline.diagnose.forward_selection import added
-from kempf.pipeline.diagnose.screen import score
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.forward_selection import added
+from kempf.pipeline.diagnose.screening.screen import score
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas import effects
 from tests.diagnose.sailing import WORKERS, Sailed, sailed

@@ -8,9 +8,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import get_args
 
-from kempf.pipeline.diagnose.effect_finding import EffectFinding
-from kempf.pipeline.diagnose.ridge_reference import TERMS
-from kempf.pipeline.diagnose.verdict import Verdict
+from kempf.pipeline.diagnose.screening.ridge_reference import TERMS
+from kempf.pipeline.diagnose.verdicts.effect_finding import EffectFinding
+from kempf.pipeline.diagnose.verdicts.verdict import Verdict
 from tests.docs.console import Command, follow, sailed, steps
 
 ROOT = Path(__file__).parents[2]

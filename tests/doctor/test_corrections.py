@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.flows.jobs.ingest.examine_log import ExaminedLog, examine_instruments
-from kempf.pipeline.channels.doctor.corrections import Correction, put_into
+from kempf.pipeline.channels.doctor.corrections import ProfileCorrection, put_into
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.profile import ChannelMap, VesselProfile
@@ -26,7 +26,7 @@ def mended(profile: VesselProfile, content: dict[str, Any]) -> VesselProfile:
     for finding in content["findings"]:
         entries = finding["faults"][0]["entries"]
         source = put_into(
-            source, tuple(Correction(k, ChannelMap.model_validate(e)) for k, e in entries.items()), "made.csv"
+            source, tuple(ProfileCorrection(k, ChannelMap.model_validate(e)) for k, e in entries.items()), "made.csv"
         )
     assert source is not None
     return profile.model_copy(update={"sources": [source]})

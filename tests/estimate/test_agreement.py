@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.unsure_instants import WithInstants
+from kempf.pipeline.diagnose.screening.unsure_instants import WithInstants
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, fit

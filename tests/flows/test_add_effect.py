@@ -10,7 +10,7 @@ import pytest
 
 from kempf.flows.jobs.diagnose import add_effect as job
 from kempf.flows.jobs.identify import vessel_model
-from kempf.pipeline.diagnose import improves_prediction
+from kempf.pipeline.diagnose.steps import improves_prediction
 from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting.ahead import Ahead

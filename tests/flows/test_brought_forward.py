@@ -20,7 +20,7 @@ from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.jobs.reprocess.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.reprocess.rerun_all import verify_all
 from kempf.flows.jobs.reprocess.rerun_set import rerun
-from kempf.pipeline.diagnose.unsure_instants import WithInstants
+from kempf.pipeline.diagnose.screening.unsure_instants import WithInstants
 from kempf.pipeline.estimate.posterior import from_json
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv

@@ -16,8 +16,8 @@ from kempf.flows.jobs.identify.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.flows.jobs.reprocess.rerun_set import rerun
-from kempf.pipeline.diagnose import instrument_noise
-from kempf.pipeline.diagnose.unsure_instants import WithInstants
+from kempf.pipeline.diagnose.screening import instrument_noise
+from kempf.pipeline.diagnose.screening.unsure_instants import WithInstants
 from kempf.schemas.instrument_noise import NAMES
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables.parameter_set import ParameterSet

@@ -34,7 +34,7 @@ def beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts of a thousand messages."""
     monkeypatch.setattr(decode, "_TOGETHER", 1_000)
-    monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 20_000)
+    monkeypatch.setattr("kempf.pipeline.ingest.mcap.container.stream.WINDOW", 20_000)
 
 
 def taken(ferry: Ship, folder: Path) -> tuple[Warehouse, Any]:

@@ -91,7 +91,7 @@ def test_remarks_docstrings_and_rooms_of_no_stage_move_nothing(source: Source, t
     found = source.reprocess(
         tmp_path / "w",
         pipeline__ingest__read=remark,
-        pipeline__segment__find_zigzags=docstring,
+        pipeline__segment__zigzags__find_zigzags=docstring,
         pipeline__estimate__estimators=remark,
         schemas__model_spec=docstring,
         pipeline__steering__nomoto=("import annotations\n", "import annotations\n\nFORMULA = 1.0\n"),

@@ -8,7 +8,7 @@ import pytest
 from mcap.stream_reader import StreamReader
 
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.mcap.container.stream import McapStream
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import CONTENTS, channel, message, variants, write

@@ -362,7 +362,7 @@ def test_a_log_that_is_longer_than_the_sample_is_read_through_for_its_clocks(mon
     data = write(moved(every(1.0), ["/gyro"], seconds=120.0))
     wanted = read(data)
     monkeypatch.setattr(decode, "_TOGETHER", 200)
-    monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 3000)
+    monkeypatch.setattr("kempf.pipeline.ingest.mcap.container.stream.WINDOW", 3000)
     found = read(data)
     assert found.frame.equals(wanted.frame) and found.notes == wanted.notes
 

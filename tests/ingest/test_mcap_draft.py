@@ -11,8 +11,8 @@ from mcap_ros2.writer import Writer as RosWriter
 
 from kempf.pipeline.ingest.draft_profile import draft_profile, draft_topics
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.fields import fields_of
-from kempf.pipeline.ingest.mcap.joint_names import joint_names
+from kempf.pipeline.ingest.mcap.topics.fields import fields_of
+from kempf.pipeline.ingest.mcap.topics.joint_names import joint_names
 from tests.ingest.ros_definitions import DEFINITIONS, joined
 from tests.ingest.test_mcap import START, write
 from tests.ingest.test_mcap_messages import header, imu

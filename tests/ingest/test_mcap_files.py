@@ -13,8 +13,8 @@ import zstandard
 from mcap.writer import CompressionType, IndexType, Writer
 
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap import budget, seams
-from kempf.pipeline.ingest.mcap.fields import fields_of
+from kempf.pipeline.ingest.mcap.container import budget, seams
+from kempf.pipeline.ingest.mcap.topics.fields import fields_of
 from kempf.schemas.errors import DataRejected
 from tests.ingest.mcap_variants import chunk_record
 from tests.ingest.test_mcap import START, plain, profile, read, write

@@ -111,7 +111,7 @@ def test_mcap_in_parts(monkeypatch: pytest.MonkeyPatch, together: int) -> None:
     wanted = read_log("a.mcap", data, profile)
     assert wanted.tally.records_rejected > 10 and wanted.notes
     monkeypatch.setattr(decode, "_TOGETHER", together)
-    monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 500)
+    monkeypatch.setattr("kempf.pipeline.ingest.mcap.container.stream.WINDOW", 500)
     parts = list(read_parts("a.mcap", data, profile))
     assert len(parts) > 1 and not any(part.notes for part in parts[:-1])
     equal(joined(parts), wanted)

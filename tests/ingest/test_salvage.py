@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from kempf.pipeline.ingest import unpack
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap import records as mcap_records
-from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.mcap.container import records as mcap_records
+from kempf.pipeline.ingest.mcap.container.stream import McapStream
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import MAGIC, channel, chunk_record, index_records, message, record, text

@@ -11,7 +11,7 @@ from kempf.pipeline.manoeuvre.pull_out import PredictedPullOut
 from kempf.pipeline.manoeuvre.spiral import PredictedSpiral
 from kempf.pipeline.manoeuvre.turning_circle import PredictedCircle
 from kempf.pipeline.manoeuvre.zigzag import PredictedZigzag
-from kempf.pipeline.segment.turning_figures import turning_figures
+from kempf.pipeline.segment.circles.turning_figures import turning_figures
 from kempf.pipeline.simulate import manoeuvre as sailed
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.model.effect_model import EffectModel

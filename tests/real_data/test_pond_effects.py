@@ -11,12 +11,12 @@ from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, known_effects
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.process.progress import silent
-from kempf.pipeline.diagnose.improves_prediction import better_ahead
-from kempf.pipeline.diagnose.joint import better_together
-from kempf.pipeline.diagnose.ladder_step import rung
-from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.verdict import verdict
+from kempf.pipeline.diagnose.steps.improves_prediction import better_ahead
+from kempf.pipeline.diagnose.steps.joint import better_together
+from kempf.pipeline.diagnose.steps.ladder_step import rung
+from kempf.pipeline.diagnose.verdicts.sentences import sentences
+from kempf.pipeline.diagnose.verdicts.verdict import verdict
 from kempf.pipeline.shooting.ahead import shooting_range
 from kempf.workbench.rungs import compared
 from tests.diagnose.sailing import WORKERS

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.segment.by_hand import zigzag_between
 from kempf.pipeline.segment.corrections import applied, same, standing
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzags.by_hand import zigzag_between
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.units import SECOND_NS

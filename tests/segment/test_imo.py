@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.imo import judge, overshoot_limits
 from kempf.pipeline.segment.particulars import Particulars
-from kempf.pipeline.segment.zigzag import SpeedConstancy, Zigzag
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.imo import judge, overshoot_limits
+from kempf.pipeline.segment.zigzags.zigzag import SpeedConstancy, Zigzag
 from tests.segment.nomoto import Instruments, Ship, measure
 
 

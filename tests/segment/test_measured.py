@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from tests.segment.loading import Log, available, load
 
 TANK = available("data/kvlcc2_hsva/*.dat")

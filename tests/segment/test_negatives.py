@@ -8,7 +8,7 @@ import pytest
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
-from kempf.pipeline.segment.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 

@@ -8,8 +8,8 @@ import pytest
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
+from kempf.pipeline.segment.spirals.random_manoeuvre import RandomManoeuvre, find_random
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 

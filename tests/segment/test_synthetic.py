@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Float, Series
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 

@@ -10,15 +10,15 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.segment.circle_drift import current_by_log
+from kempf.pipeline.segment.circles.circle_drift import current_by_log
+from kempf.pipeline.segment.circles.imo_turning import judge_circle
+from kempf.pipeline.segment.circles.turn_track import TurnTrack
+from kempf.pipeline.segment.circles.turning_circle import MeasuredCircle
 from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.particulars import Particulars
-from kempf.pipeline.segment.pull_out import PullOut
-from kempf.pipeline.segment.spiral import Spiral, SpiralPoint
-from kempf.pipeline.segment.turn_track import TurnTrack
-from kempf.pipeline.segment.turning_circle import MeasuredCircle
+from kempf.pipeline.segment.spirals.pull_out import PullOut
+from kempf.pipeline.segment.spirals.spiral import Spiral, SpiralPoint
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.manoeuvre import RudderHold, SteadyCourse
 from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn

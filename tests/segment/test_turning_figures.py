@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
+from kempf.pipeline.segment.circles.turning_figures import TurningFigures, turning_figures
 
 
 def spiral_in(side: float, turn_deg: float, *, course_deg: float = 30.0, step_s: float = 0.5) -> TurningFigures:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.measured import Signals
-from kempf.pipeline.segment.yaw_rate import settling_rate
+from kempf.pipeline.segment.rudder.measured import Signals
+from kempf.pipeline.segment.rudder.yaw_rate import settling_rate
 
 HOLD_S, STEP_S = 120.0, 0.5
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.remaining_misfit import RemainingMisfit, remaining_misfit, said
+from kempf.pipeline.diagnose.verdicts.remaining_misfit import RemainingMisfit, remaining_misfit, said
 from kempf.pipeline.shooting.ahead import Ahead, shooting_range
 from kempf.pipeline.shooting.places import Places, places
 from kempf.pipeline.shooting.repeats import FEWEST_PAIRS, Repeats, _summed, repeats

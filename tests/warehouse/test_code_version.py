@@ -50,7 +50,7 @@ def _is_module(name: str) -> bool:
 
 def test_stages_count_what_is_theirs() -> None:
     of = {stage: set(code_version.modules_in(ROOT, stage)) for stage in code_version.STAGES}
-    assert "kempf.pipeline.segment.find_zigzags" in of["segment"] - of["estimate"] - of["ingest"]
+    assert "kempf.pipeline.segment.zigzags.find_zigzags" in of["segment"] - of["estimate"] - of["ingest"]
     assert "kempf.pipeline.estimate.likelihood" in of["estimate"] - of["segment"]
     assert of["ingest"] <= of["segment"] and of["ingest"] <= of["estimate"] <= of["diagnose"] >= of["segment"]
     assert "kempf.pipeline.model.effects.rudder_lag" in of["estimate"], "code of an effect of the catalogue"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.diagnose.sentences import _share
+from kempf.pipeline.diagnose.verdicts.sentences import _share
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.workbench.rungs import compared, in_words, remarks
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
-from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
+from kempf.pipeline.segment.circles.turning_figures import TurningFigures, turning_figures
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, TurningCircle

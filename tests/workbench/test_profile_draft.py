@@ -8,8 +8,8 @@ import yaml
 
 from kempf.pipeline.ingest.delimited import titled
 from kempf.pipeline.ingest.draft_profile import draft_profile
-from kempf.pipeline.ingest.mcap.fields import numbers_of
-from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
+from kempf.pipeline.ingest.mcap.container.records import McapChannel, Schema
+from kempf.pipeline.ingest.mcap.topics.fields import numbers_of
 from kempf.schemas.profile import Source
 from tests.workbench.driving import kempf, refused
 

@@ -21,8 +21,8 @@ from benchmarks.diagnose.late_rudder import LAG_S
 from kempf.flows.jobs.diagnose import diagnose_vessel
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.standing_model import Own
-from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED
-from kempf.pipeline.diagnose.verdict import Verdict
+from kempf.pipeline.diagnose.verdicts.effect_finding import NOT_EXPLAINED
+from kempf.pipeline.diagnose.verdicts.verdict import Verdict
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.storage import delta

@@ -50,8 +50,14 @@ STAGES: dict[Stage, Entry] = {
         (
             *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
             *("channels.doctor.refused", "channels.doctor.verdict"),
-            *("segment.find_zigzags", "segment.find_circles_and_spirals", "segment.random_manoeuvre"),
-            *("segment.by_hand", "segment.corrections", "segment.imo", "segment.imo_turning", "segment.lateral"),
+            *("segment.zigzags.find_zigzags", "segment.find_circles_and_spirals", "segment.spirals.random_manoeuvre"),
+            *(
+                "segment.zigzags.by_hand",
+                "segment.corrections",
+                "segment.zigzags.imo",
+                "segment.circles.imo_turning",
+                "segment.lateral",
+            ),
             "estimate.no_log.companions",
         ),
         ("ingest",),
@@ -62,13 +68,20 @@ STAGES: dict[Stage, Entry] = {
             *("estimate.updated", "predict.free_run"),
             *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
             "estimate.record.loads",
-            *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.unsure_instants"),
+            *(
+                "diagnose.screening.staged",
+                "diagnose.steps.ladder_step",
+                "diagnose.split",
+                "diagnose.screening.unsure_instants",
+            ),
         ),
         ("ingest",),
         _SHOWN + _SAID,
     ),
     "diagnose": Entry(
-        ("diagnose.diagnosis", "diagnose.diagnosis_json", "diagnose.evidence"), ("segment", "estimate"), _SHOWN
+        ("diagnose.verdicts.diagnosis", "diagnose.verdicts.diagnosis_json", "diagnose.evidence.evidence"),
+        ("segment", "estimate"),
+        _SHOWN,
     ),
 }
 #: Rooms that a result is a function of.

@@ -20,8 +20,8 @@ from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import assembled
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.predict.free_run import free_run
 from kempf.schemas.effects import catalogue
 from kempf.schemas.errors import KempfError

@@ -11,7 +11,7 @@ from kempf.flows.jobs.predict.checked_prediction import CheckedPredictions
 from kempf.flows.jobs.predict.predict_request import PredictRequest
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.prediction import PredictedFigure
-from kempf.pipeline.segment.turning_figures import turning_figures
+from kempf.pipeline.segment.circles.turning_figures import turning_figures
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.storage.store import Warehouse
 

@@ -14,7 +14,7 @@ from kempf.pipeline.compare.comparison import FITTED, HELD_OUT, ComparedRun, jud
 from kempf.pipeline.compare.evidence import Evidence
 from kempf.pipeline.compare.marks import marks
 from kempf.pipeline.compare.misfit import where
-from kempf.pipeline.compare.overshoot import Turn, turns_of
+from kempf.pipeline.compare.overshoot import StoredOvershoot, turns_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
@@ -153,7 +153,7 @@ def compared(bound_runs: BoundRuns, horizon: Horizon, progress: Progress = silen
     )
 
 
-def _turns(segment: Segment, run: GridRun) -> tuple[Turn, ...]:
+def _turns(segment: Segment, run: GridRun) -> tuple[StoredOvershoot, ...]:
     def seconds(ns: int) -> float:
         return (ns - run.start_utc_ns) / SECOND_NS
 

@@ -21,7 +21,7 @@ from kempf.warehouse.tables import parameter_sets
 from kempf.warehouse.tables.parameter_set import ParameterSet
 
 #: standard errors beyond which a prediction is worse, and part of the misfit:
-#: `kempf.pipeline.diagnose.improves_prediction`
+#: `kempf.pipeline.diagnose.steps.improves_prediction`
 WORSE, LEAST_RISE = 2.0, 0.01
 
 

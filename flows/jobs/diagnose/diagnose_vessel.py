@@ -13,12 +13,12 @@ from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.diagnosis_json import as_json
-from kempf.pipeline.diagnose.evidence import evidence_of
-from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag
-from kempf.pipeline.diagnose.misfit import where_left
+from kempf.pipeline.diagnose.evidence.evidence import evidence_of
+from kempf.pipeline.diagnose.evidence.manoeuvre_evidence import SailedZigzag
+from kempf.pipeline.diagnose.evidence.misfit import where_left
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
+from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
 from kempf.pipeline.predict.run_residuals import PhaseInterval, phases_s
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.storage.store import Warehouse

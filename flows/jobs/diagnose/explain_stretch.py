@@ -13,8 +13,8 @@ from kempf.flows.jobs.identify.standing_model import Own, known_effects
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.compare.run_series import instants_utc_ns
-from kempf.pipeline.diagnose.stretch import Explained, explain
-from kempf.pipeline.diagnose.stretch_json import as_json
+from kempf.pipeline.diagnose.stretches.stretch import Explained, explain
+from kempf.pipeline.diagnose.stretches.stretch_json import as_json
 from kempf.pipeline.estimate.pooled_fit import fit
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.schemas.instants import iso_utc

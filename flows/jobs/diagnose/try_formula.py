@@ -54,8 +54,8 @@ def tried(
         ``no_vessel``, ``no_segments``, ``no_runs``.
     """
     from kempf.flows.jobs.diagnose.diagnose_vessel import examine
-    from kempf.pipeline.diagnose.diagnosis_json import as_json
     from kempf.pipeline.diagnose.settings import DiagnosisSettings
+    from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
 
     tried = formula_of_ones_own(name, formula)
     spec, own = standing_model(warehouse, vessel)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from kempf.flows.process.cores import usable
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.unsure_instants import with_instants
+from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.estimate.agreement import Agreement
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty

@@ -25,8 +25,8 @@ from kempf.flows.jobs.state.out_of_date import command_for
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.diagnose.ladder_step import rung, step_of
-from kempf.pipeline.diagnose.unsure_instants import with_instants
+from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
+from kempf.pipeline.diagnose.steps.ladder_step import rung, step_of
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.posterior import from_json, posterior_of

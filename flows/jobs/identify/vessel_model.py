@@ -31,9 +31,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.diagnose.ladder_step import rung, step_of
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.steps.ladder_step import rung, step_of
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.maximum_likelihood import settings_of

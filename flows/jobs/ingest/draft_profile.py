@@ -10,7 +10,7 @@ from kempf.pipeline.ingest import delimited, draft_profile
 from kempf.pipeline.ingest.encoding import advice_on, as_utf8, utf16_of
 from kempf.pipeline.ingest.foreign_files import foreign_file
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.fields import fields_of, obstacles
+from kempf.pipeline.ingest.mcap.topics.fields import fields_of, obstacles
 from kempf.pipeline.ingest.sniff import MCAP_MAGIC, SAMPLE, is_json, sniff
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError

@@ -11,19 +11,19 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.segment import corrections
-from kempf.pipeline.segment.by_hand import zigzag_between
+from kempf.pipeline.segment.circles.imo_turning import judge_circle
+from kempf.pipeline.segment.circles.turning_circle import MeasuredCircle
 from kempf.pipeline.segment.corrections import Marked, Standing
 from kempf.pipeline.segment.find_circles_and_spirals import find_circles_and_spirals
-from kempf.pipeline.segment.find_zigzags import find_zigzags
-from kempf.pipeline.segment.imo import judge
-from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
 from kempf.pipeline.segment.particulars import Particulars
-from kempf.pipeline.segment.pull_out import PullOut
-from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
-from kempf.pipeline.segment.spiral import Spiral
-from kempf.pipeline.segment.turning_circle import MeasuredCircle
-from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.spirals.pull_out import PullOut
+from kempf.pipeline.segment.spirals.random_manoeuvre import RandomManoeuvre, find_random
+from kempf.pipeline.segment.spirals.spiral import Spiral
+from kempf.pipeline.segment.zigzags.by_hand import zigzag_between
+from kempf.pipeline.segment.zigzags.find_zigzags import find_zigzags
+from kempf.pipeline.segment.zigzags.imo import judge
+from kempf.pipeline.segment.zigzags.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.tables.segments import Segment, segment_id

@@ -18,7 +18,7 @@ from kempf.flows.jobs.predict.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.predict.predicted import SetPrediction
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.confusion_sets import WINDOW
+from kempf.pipeline.diagnose.steps.confusion_sets import WINDOW
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.manoeuvre import motion

@@ -21,7 +21,7 @@ _OFFSET, _DELAY, _RATE = 1, 2, 6
 
 
 @dataclass(frozen=True)
-class Correction:
+class ProfileCorrection:
     """One entry of ``channels`` in a source of the profile, as it should be."""
 
     #: Column, field of a topic, or sentence and channel.
@@ -73,7 +73,9 @@ def _usual(channel: str) -> str:
     return "rpm" if channel == "shaft_speed" else unit
 
 
-def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> tuple[Correction, ...]:
+def propose(
+    fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_format: str
+) -> tuple[ProfileCorrection, ...]:
     """Return the entries that correct a fault; none where the profile cannot.
 
     Parameters
@@ -88,12 +90,12 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
         if log_format == "nmea":
             return ()  # a sentence fixes which channel it carries
         return tuple(
-            Correction(known[old][0], known[old][1].model_copy(update={"channel": new}))
+            ProfileCorrection(known[old][0], known[old][1].model_copy(update={"channel": new}))
             for old, new in _exchanged(fault)
         )
     if fault.kind == "axes":
-        return tuple(Correction(known[c][0], _in_other_axes(fault, c, known[c][1])) for c in fault.channels)
-    return tuple(Correction(known[c][0], _corrected(fault, c, known[c][1])) for c in fault.channels)
+        return tuple(ProfileCorrection(known[c][0], _in_other_axes(fault, c, known[c][1])) for c in fault.channels)
+    return tuple(ProfileCorrection(known[c][0], _corrected(fault, c, known[c][1])) for c in fault.channels)
 
 
 def _in_other_axes(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:
@@ -184,7 +186,7 @@ def setting(fault: Fault) -> str:
     }.get(fault.kind, "")
 
 
-def put_into(source: Source | None, corrections: tuple[Correction, ...], match: str) -> Source:
+def put_into(source: Source | None, corrections: tuple[ProfileCorrection, ...], match: str) -> Source:
     """Return a source with some entries as they should be.
 
     Parameters

@@ -117,10 +117,15 @@ class Bounded(Protocol):
     high: Float
 
 
+def pressed(at: Float, low: Float, high: Float, score: Float) -> Mask:
+    """Return which elements are at a bound that their score would have them leave, shape (n,)."""
+    against: Mask = ((at <= low) & (score < 0.0)) | ((at >= high) & (score > 0.0))
+    return against
+
+
 def free(objective: Bounded, theta: Float, score: Float) -> Mask:
     """Return which elements may move: active and not pressed against a bound."""
-    pressed: Mask = ((theta <= objective.low) & (score < 0)) | ((theta >= objective.high) & (score > 0))
-    return objective.active & ~pressed
+    return objective.active & ~pressed(theta, objective.low, objective.high, score)
 
 
 def climb(objective: Objective[Float], start: Float, max_iterations: int, decrement: float) -> Search[Float]:

@@ -11,21 +11,21 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap import sentences
-from kempf.pipeline.ingest.mcap.arrivals import Arrived, by_source
-from kempf.pipeline.ingest.mcap.batch import Batch
-from kempf.pipeline.ingest.mcap.clocks import put_right
-from kempf.pipeline.ingest.mcap.corrected import Corrected
-from kempf.pipeline.ingest.mcap.fields_seen import FieldsSeen
-from kempf.pipeline.ingest.mcap.files import McapFiles
-from kempf.pipeline.ingest.mcap.odd_times import OddTime
-from kempf.pipeline.ingest.mcap.own_stamps import OwnStamps
+from kempf.pipeline.ingest.mcap.container.batch import Batch
+from kempf.pipeline.ingest.mcap.container.files import McapFiles
+from kempf.pipeline.ingest.mcap.container.records import McapChannel
 from kempf.pipeline.ingest.mcap.part import Part, Waiting
-from kempf.pipeline.ingest.mcap.publishers import Publishers
-from kempf.pipeline.ingest.mcap.recorder_time import TIMES, RecorderTime
-from kempf.pipeline.ingest.mcap.records import McapChannel
-from kempf.pipeline.ingest.mcap.topics import DecodedTopics, Route
-from kempf.pipeline.ingest.mcap.unmapped import NAMED, unmapped
+from kempf.pipeline.ingest.mcap.times.arrivals import Arrived, by_source
+from kempf.pipeline.ingest.mcap.times.clocks import put_right
+from kempf.pipeline.ingest.mcap.times.corrected import Corrected
+from kempf.pipeline.ingest.mcap.times.own_stamps import OwnStamps
+from kempf.pipeline.ingest.mcap.times.publishers import Publishers
+from kempf.pipeline.ingest.mcap.times.recorder_time import TIMES, RecorderTime
+from kempf.pipeline.ingest.mcap.topics import sentences
+from kempf.pipeline.ingest.mcap.topics.fields_seen import FieldsSeen
+from kempf.pipeline.ingest.mcap.topics.odd_times import OddTime
+from kempf.pipeline.ingest.mcap.topics.topics import DecodedTopics, Route
+from kempf.pipeline.ingest.mcap.topics.unmapped import NAMED, unmapped
 from kempf.pipeline.ingest.messages.columns import NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError

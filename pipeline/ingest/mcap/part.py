@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import Decoded, Values
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.arrivals import Arrived
-from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.container.batch import Batch, PayloadsBuilder, joined
+from kempf.pipeline.ingest.mcap.times.arrivals import Arrived
 
 T = TypeVar("T", bound=np.generic)
 

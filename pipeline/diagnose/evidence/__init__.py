@@ -1,0 +1,1 @@
+"""What a diagnosis shows: the curves and figures behind it."""

@@ -1,0 +1,1 @@
+"""Explain one stretch: which effect would account for it."""

@@ -1,0 +1,1 @@
+"""What a diagnosis found, what is left unexplained, in words and in JSON."""

@@ -1,0 +1,1 @@
+"""The container: chunks, records and batches of messages, whole or torn."""

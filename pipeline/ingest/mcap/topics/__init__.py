@@ -1,0 +1,1 @@
+"""Topics and their fields: which are read, under what name, and which are left."""

@@ -1,0 +1,1 @@
+"""Turning circles: found, put on their track without the current, and what they measure."""

@@ -1,0 +1,1 @@
+"""Spirals, pull-outs and manoeuvres of random orders."""

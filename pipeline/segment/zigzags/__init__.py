@@ -1,0 +1,1 @@
+"""Zigzags: found, described, judged by the IMO's limits."""
