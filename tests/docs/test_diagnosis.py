@@ -25,7 +25,8 @@ def test_the_thresholds_are_those_of_the_code() -> None:
     rows = re.findall(r"^\| [^|]+ \| ([\d.]+) \| `(\w+)\.([\w.]+)` \|$", TEXT, flags=re.MULTILINE)
     assert len(rows) == TEXT.partition("## Thresholds")[2].partition("\n## ")[0].count("\n|") - 2
     for value, module, path in rows:
-        (file,) = (ROOT / "pipeline").rglob(f"{module}.py")
+        rooms = (ROOT / "pipeline" / room for room in ("diagnose", "estimate", "shooting"))
+        (file,) = (file for room in rooms for file in room.rglob(f"{module}.py"))
         found = import_module(".".join(["kempf", *file.relative_to(ROOT).with_suffix("").parts]))
         for name in path.split("."):
             found = getattr(found, name)
