@@ -12,7 +12,7 @@ from kempf.warehouse.storage.canonical import canonical_json
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import aliases, parameter_sets, provenance
 from kempf.warehouse.tables.agreement import content_digest, differences, verdict
-from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
+from kempf.warehouse.tables.parameter_set import Bounds, ParameterSet, StoredValue, ids_of_each, parameter_set_id
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 
 
@@ -76,6 +76,17 @@ def test_the_id_is_a_function_of_every_input() -> None:
         inputs(code_version="other"),
     ]
     assert len({same, *(parameter_set_id(one) for one in others)}) == len(others) + 1
+
+
+def test_ids_of_many_segments_are_those_of_each() -> None:
+    """What they have in common may name anything, and bounds may be any whole numbers."""
+    common = replace(
+        inputs(), log_ids=(), bounds=(), settings={"own": {"x": 'named "\0log" or \0segment, é'}, "bound": float("inf")}
+    )
+    bounds = [Bounds("a" * 64, 0, 1), Bounds("b" * 64, -1, 2**62), Bounds("named é", START_NS, START_NS + 1)]
+    each = [parameter_set_id(replace(common, log_ids=(one.log_id,), bounds=(one,))) for one in bounds]
+    assert ids_of_each(common, bounds) == each and len(set(each)) == 3
+    assert ids_of_each(common, []) == []
 
 
 def test_ids_may_be_shortened_while_they_are_unique(warehouse: Warehouse) -> None:

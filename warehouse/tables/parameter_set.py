@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from math import hypot, nan
 from typing import Any
 
+from orjson import OPT_SORT_KEYS, dumps
+
 from kempf.schemas.instants import iso_utc
 from kempf.warehouse.storage.canonical import canonical_json, plain, sha256
 
@@ -89,7 +91,32 @@ class Inputs:
 
 def parameter_set_id(inputs: Inputs) -> str:
     """Return the id of what these inputs produce: ``ps-`` and 16 hex digits of the SHA-256 of their canonical JSON."""
-    return "ps-" + sha256(inputs.canonical_json())[:16]
+    return _id_of(inputs.canonical_json())
+
+
+def ids_of_each(common: Inputs, bounds: Sequence[Bounds]) -> list[str]:
+    """Return the ids of the sets that these inputs produce of one segment each, in the order given.
+
+    What they have in common is written once, so that it costs little to know which of thousands are stored.
+
+    Parameters
+    ----------
+    common : Inputs
+        Without segments and logs.
+    bounds : sequence of Bounds
+        Of the segments.
+    """
+    log, segment = "\0log", "\0segment"
+    content = {**common.as_json(), "log_ids": [log], "segments": [segment]}
+    head, rest = canonical_json(content).split(canonical_json(log))
+    between, tail = rest.split(canonical_json(segment))
+    # of text and whole numbers orjson writes what json does
+    own = [(dumps(one.log_id).decode(), dumps(vars(one), option=OPT_SORT_KEYS).decode()) for one in bounds]
+    return [_id_of(f"{head}{log_id}{between}{part}{tail}") for log_id, part in own]
+
+
+def _id_of(text: str) -> str:
+    return "ps-" + sha256(text)[:16]
 
 
 #: key of the settings of a set that brings another one forward

@@ -31,7 +31,7 @@ from kempf.warehouse.storage import delta
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import logs, parameter_sets, provenance, segments, vessels
 from kempf.warehouse.tables.equivalents import code_of
-from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.tables.parameter_set import Bounds, Inputs, ParameterSet, ids_of_each, parameter_set_id
 from kempf.warehouse.tables.segments import Segment
 
 
@@ -194,26 +194,43 @@ class _Wanted:
     """A segment, and all that its set is a function of."""
 
     segment: Segment
-    inputs: Inputs
     set_id: str
     companions: tuple[Segment, ...]
     profile: VesselProfile
+    #: Without the segment, its companions and their logs.
+    common: Inputs
+
+    @property
+    def inputs(self) -> Inputs:
+        """All that the set is a function of."""
+        return _with(self.common, self.segment, self.companions)
 
 
 def _wanted(
     warehouse: Warehouse, request: Request, readable: Sequence[Segment], by_ingest: Mapping[str, logs.LogRow]
 ) -> list[_Wanted]:
-    """Return what is wanted of every segment."""
+    """Return what is wanted of every segment, in order of time."""
     alone = request.estimator not in CAN or bool(request.spec.effects)
     hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
     profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
-    tasks, code = [], code_of(warehouse, "estimate")
+    code = code_of(warehouse, "estimate")
+    alike: dict[tuple[str, bool], list[Segment]] = {}
     for segment in readable:
-        sha256 = by_ingest[segment.ingest_id].profile_sha256
-        beside = () if alone or not without_log(segment) else companions_of(segment, readable, by_ingest)
-        inputs = inputs_of(segment, sha256, request, beside, code)
-        tasks.append(_Wanted(segment, inputs, parameter_set_id(inputs), tuple(beside), profiles[sha256]))
-    return tasks
+        alike.setdefault((by_ingest[segment.ingest_id].profile_sha256, without_log(segment)), []).append(segment)
+    tasks = []
+    for (sha256, logless), hers in alike.items():
+        common = _common_inputs(sha256, request, code, logless=logless)
+        if logless and not alone:
+            for segment in hers:
+                beside = tuple(companions_of(segment, readable, by_ingest))
+                name = parameter_set_id(_with(common, segment, beside))
+                tasks.append(_Wanted(segment, name, beside, profiles[sha256], common))
+        else:
+            names = ids_of_each(common, [_bounds(segment) for segment in hers])
+            tasks += [
+                _Wanted(segment, name, (), profiles[sha256], common) for segment, name in zip(hers, names, strict=True)
+            ]
+    return sorted(tasks, key=lambda task: (task.segment.start_utc_ns, task.segment.segment_id))
 
 
 def _identify_log(
@@ -272,19 +289,37 @@ def inputs_of(
     code : str, optional
         Fingerprint under which the present code estimates; its own by default.
     """
+    made_by = code or code_version.fingerprint("estimate")
+    return _with(_common_inputs(profile_sha256, request, made_by, logless=without_log(segment)), segment, companions)
+
+
+def _common_inputs(profile_sha256: str, request: Request, code: str, *, logless: bool) -> Inputs:
+    """Return what sets of single segments are a function of beside these: of segments that all have a log, or none."""
     settings = request.all_settings
-    if request.estimator in CAN and without_log(segment) and not request.spec.effects:
+    if request.estimator in CAN and logless and not request.spec.effects:
         settings = {**settings, KEY: no_log_settings(dict(request.no_log))}
     return Inputs(
-        log_ids=(segment.log_id, *(s.log_id for s in companions)),
+        log_ids=(),
         profile_sha256=profile_sha256,
-        bounds=(Bounds(segment.log_id, segment.start_utc_ns, segment.end_utc_ns),),
+        bounds=(),
         model_spec=request.spec.model_dump(mode="json"),
         estimator=request.estimator,
         settings=settings,
-        code_version=code or code_version.fingerprint("estimate"),
-        companions=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in companions),
+        code_version=code,
     )
+
+
+def _with(common: Inputs, segment: Segment, companions: Sequence[Segment]) -> Inputs:
+    return replace(
+        common,
+        log_ids=(segment.log_id, *(s.log_id for s in companions)),
+        bounds=(_bounds(segment),),
+        companions=tuple(map(_bounds, companions)),
+    )
+
+
+def _bounds(segment: Segment) -> Bounds:
+    return Bounds(segment.log_id, segment.start_utc_ns, segment.end_utc_ns)
 
 
 def build(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:
