@@ -74,15 +74,25 @@ def marked(table: DeltaTable | None, vessel: str, logs: LogsAsOf, columns: Seque
         sets = as_then(table, "parameter_sets", vessel, {}, wanted)
     else:
         sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, wanted)
-    provenance = pl.col("provenance_json").str
-    at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
-    sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)
+    # read once for all that is asked of it: a vessel has thousands
+    made = sets["provenance_json"].str.json_decode(
+        pl.Struct(
+            {
+                "code_version": pl.String,
+                "ingest_ids": pl.List(pl.String),
+                "table_versions": pl.Struct({"parameter_sets": pl.Int64}),
+            }
+        )
+    )
+    at = made.struct.field("table_versions").struct.field("parameter_sets").fill_null(-1)
+    sets = sets.with_columns(_code=made.struct.field("code_version"), _at=at)
     codes = sets["_code"].to_list()
     newest = logs.code if logs.code in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
     old = pl.col("_code").ne_missing(newest)
     if logs.past:
-        # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another
-        old |= provenance.json_path_match("$.ingest_ids").str.contains_any(logs.past).fill_null(value=False)
+        # a set of several logs is superseded with any of them
+        past = made.struct.field("ingest_ids").list.eval(pl.element().is_in(logs.past)).list.any()
+        old |= past.fill_null(value=False)
     if logs.segments is not None:
         old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(logs.segments)).list.all()
     noted = [

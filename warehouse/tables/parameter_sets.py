@@ -343,10 +343,28 @@ class Convergence:
     pooling: dict[str, Any]
 
 
-def convergences(
+def converged(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict[str, bool]:
+    """Return whether the search for each of some sets of a vessel converged, by id; one that is not stored is left out.
+
+    Parameters
+    ----------
+    names : collection of str
+        Whole ids.
+    """
+    import polars as pl
+
+    where: Where = {"vessel_key": vessel_key(vessel), "parameter_set_id": sorted(names)}
+    with delta.lent(warehouse, "parameter_sets", where) as lazy:
+        frame = lazy.select("parameter_set_id", pl.col("convergence_json").str.json_path_match("$.converged")).collect()
+    return {name: text == "true" for name, text in frame.rows()}
+
+
+def convergences_to_look_at(
     warehouse: Warehouse, vessel: str | None, code: str | None = None, names: Collection[str] | None = None
 ) -> list[Convergence]:
-    """Return how the search for each set of one vessel or of all ended, sorted by id.
+    """Return how the search ended for the sets of one vessel or of all that a person should look at, sorted by id.
+
+    The search did not converge, or the set leaves segments out, or its separate hulls are not one.
 
     Parameters
     ----------
@@ -368,14 +386,19 @@ def convergences(
             (lazy if code is None else lazy.filter(by == code))
             .select(
                 *columns[:4],
-                convergence.json_path_match("$.converged") == "true",
-                left=convergence.json_path_match("$.left_out"),
-                pooling=convergence.json_path_match("$.pooling"),
+                converged=convergence.json_path_match("$.converged").eq_missing("true"),
+                left=convergence.json_path_match("$.left_out").fill_null("{}"),
+                pooling=convergence.json_path_match("$.pooling").fill_null("{}"),
+            )
+            .filter(
+                ~pl.col("converged")
+                | (pl.col("left") != "{}")
+                | pl.col("pooling").str.contains('"may_be_pooled":false', literal=True)
             )
             .collect()
         )
     return [
-        Convergence(name, model, estimator, tuple(ids), bool(converged), loads(left or "{}"), loads(pooling or "{}"))
+        Convergence(name, model, estimator, tuple(ids), converged, loads(left), loads(pooling))
         for name, model, estimator, ids, converged, left, pooling in frame.sort("parameter_set_id").rows()
     ]
 

@@ -160,11 +160,7 @@ def identify_segments(
     table_versions = delta.versions(warehouse)
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
     tasks = _wanted(warehouse, request, readable, by_ingest)
-    names = [task.set_id for task in tasks]
-    known = {
-        convergence.parameter_set_id: convergence
-        for convergence in parameter_sets.convergences(warehouse, vessel, names=names)
-    }
+    known = parameter_sets.converged(warehouse, vessel, [task.set_id for task in tasks])
     outcomes = [
         IdentifyOutcome(segment, None, error=refreshed.failed[segment.ingest_id])
         for segment in current
@@ -172,11 +168,10 @@ def identify_segments(
     ]
     missing: dict[str, list[_Wanted]] = {}
     for task in tasks:
-        held = known.get(task.set_id)
-        if held is None:
+        if task.set_id not in known:
             missing.setdefault(task.segment.ingest_id, []).append(task)
         else:
-            outcomes.append(IdentifyOutcome(task.segment, None, set_id=task.set_id, converged=held.converged))
+            outcomes.append(IdentifyOutcome(task.segment, None, set_id=task.set_id, converged=known[task.set_id]))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, (ingest, log_segments) in enumerate(missing.items()):
             progress(done, len(missing), f"identifying {len(log_segments)} segments of {by_ingest[ingest].file_name}")

@@ -48,7 +48,7 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
     """
     manoeuvres = segments.found_in(warehouse, vessel)
     standing = {name: place for place, name in enumerate(standing_ids(warehouse, vessel))}
-    sets = parameter_sets.convergences(warehouse, vessel, names=list(standing))
+    sets = parameter_sets.convergences_to_look_at(warehouse, vessel, names=list(standing))
     sets.sort(key=lambda row: standing[row.parameter_set_id])
     return [*_of_logs(warehouse, vessel, manoeuvres), *_of_sets(sets)]
 
@@ -102,7 +102,7 @@ def marks(warehouse: Warehouse, vessel: str | None = None) -> dict[str, list[str
         ``no_warehouse``.
     """
     marked: dict[str, list[str]] = {}
-    for row in parameter_sets.convergences(warehouse, vessel, code_of(warehouse, "estimate")):
+    for row in parameter_sets.convergences_to_look_at(warehouse, vessel, code_of(warehouse, "estimate")):
         remarks = dict.fromkeys(row.left_out, "left out of the pooled set")
         # of a pooled set that did not converge no single zigzag is at fault
         if not row.converged and len(row.segment_ids) == 1:
