@@ -16,6 +16,7 @@ from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.diagnose.screening.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.steps import by_likelihood
 from kempf.pipeline.diagnose.steps.by_likelihood import only_fitted
 from kempf.pipeline.diagnose.steps.by_prediction import _stands
 from kempf.pipeline.diagnose.steps.confirm import Confirmation, Unseen
@@ -32,6 +33,8 @@ from kempf.pipeline.estimate.iteration import SILENT
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
+from kempf.pipeline.shooting.ahead import Ahead
+from kempf.pipeline.shooting.left_out import LeftOut
 from kempf.schemas import effects
 from kempf.schemas.errors import DataRejected
 from tests.diagnose.heard import Heard
@@ -275,7 +278,7 @@ def test_zigzags_to_one_side_alone_claim_no_asymmetry() -> None:
     found = replace(ship, runs=tuple(ship.runs[k] for k in numbers)).diagnosis(
         ("rudder_asymmetry", "neutral_angle", "gyro_bias")
     )
-    assert verdict(found) == "adequate" and not found.held
+    assert verdict(found) == "insufficient_data" and not found.held
     assert {one["verdict"] for one in as_json(found)["candidates"]} <= {"absent", "not_testable"}
 
 
@@ -375,6 +378,70 @@ def test_what_only_improves_the_fit_is_suspected(folds: list[float], held_out: l
     assert only_fitted([(candidate, found)]) == {"rudder_lag": f"it improves the fit; {why}"}
     # one that holds is claimed, one that is not worth its parameters is absent
     assert only_fitted([(candidate, refitted()), (candidate, replace(found, bic_change=-1.0))]) == {}
+
+
+def test_one_manoeuvre_alone_confirms_nothing_and_refutes_nothing() -> None:
+    """What it was fitted to is none that it was not fitted to."""
+    found = replace(refitted(), fold_gains=np.zeros(1), held_out_gains=np.zeros(0))
+    assert not found.predicts and found.gains_left_out.size == 0 and found.gained_in == (0, 0)
+    assert refusal(found) == "one manoeuvre alone does not confirm it"
+
+
+def with_left_out(misfits: list[float], values: tuple[float, ...] = (), disagrees: object = None) -> Ahead:
+    """One leg ahead: errors of three manoeuvres left out, and the size of an effect beside a standard error of 1."""
+    errors = tuple(np.full((8, 1), misfit) for misfit in misfits)
+    return cast(
+        Ahead,
+        SimpleNamespace(
+            left_out=LeftOut(np.array(misfits), errors),
+            disagrees=disagrees,
+            model=SimpleNamespace(own=lambda _: slice(0, len(values))),
+            fit=SimpleNamespace(values=np.array(values)),
+            std=np.ones(6 + len(values)),
+        ),
+    )
+
+
+@pytest.mark.parametrize(("after", "raises"), [([1.0, 1.0, 1.01], False), ([1.0, 1.0, 2.0], True), ([0.5] * 3, False)])
+def test_what_raises_the_misfit_of_manoeuvres_left_out_is_not_claimed(after: list[float], raises: bool) -> None:
+    """Also where it rises in one alone, so that two standard errors do not show it."""
+    assert by_likelihood._raises(with_left_out([1.0, 1.0, 1.0]), with_left_out(after)) == raises
+    assert not by_likelihood._raises(None, with_left_out(after))
+
+
+@pytest.mark.parametrize(
+    ("effect", "size", "disagrees", "nothing"),
+    [
+        ("earth_current", (1.5, -0.5), object(), True),
+        ("earth_current", (1.5, -2.5), object(), False),
+        # predictions go by the likelihood's parameters
+        ("earth_current", (1.5, -0.5), None, False),
+        # legs say little of an instrument
+        ("gyro_bias", (0.5,), object(), False),
+    ],
+)
+def test_an_effect_that_is_nothing_by_the_fit_that_predicts_is_not_claimed(
+    effect: str, size: tuple[float, ...], disagrees: object, nothing: bool
+) -> None:
+    ahead = with_left_out([1.0] * 3, size, disagrees)
+    ladder = cast(Ladder, SimpleNamespace(shooting=SimpleNamespace(beside=lambda ahead, _: ahead)))
+    pair = (cast(Candidate, SimpleNamespace(effect=effects.get(effect))), refitted())
+    assert by_likelihood._is_nothing_by_legs(ladder, ahead, pair) == nothing
+
+
+def test_a_model_whose_fits_disagree_is_not_adequate(calm: tuple[Sailed, Diagnosis]) -> None:
+    """The flexible reference may see nothing left one step ahead, where disturbances carry what is missing."""
+    found = calm[1]
+    (first,) = found.steps
+    assert first.ahead is not None and first.ahead.disagrees is None and verdict(found) == "adequate"
+    own = first.ahead.own
+    windows = tuple(errors * np.linspace(9.0, 11.0, len(errors))[:, None] for errors in own.errors)
+    worse = LeftOut(10.0 * own.misfits, windows)
+    apart = replace(found, steps=(replace(first, ahead=replace(first.ahead, one_step=worse)),))
+    assert verdict(apart) == "unexplained" and not as_json(apart)["sets"]
+    said = " ".join(sentences(apart))
+    assert "Fits one step and one leg ahead disagree: with parameters fitted to legs the misfit is 90 % smaller" in said
+    assert "No effect of the catalogue improves" not in said
 
 
 @pytest.mark.parametrize("wrong", range(6))

@@ -128,7 +128,9 @@ def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
 
 def _share(content: Mapping[str, Any]) -> str:
     share = content.get("share_explained")
-    return "" if share is None else f", which explains {100.0 * share:.0f} % of the misfit one leg ahead"
+    if share is None or share <= 0.0:
+        return ""
+    return f", which explains {100.0 * share:.0f} % of the misfit one leg ahead"
 
 
 def _next_steps(

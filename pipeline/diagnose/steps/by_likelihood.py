@@ -15,14 +15,16 @@ import numpy as np
 
 from kempf.pipeline.diagnose.screening.forward_selection import is_ship
 from kempf.pipeline.diagnose.screening.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.steps.by_prediction import is_sized
 from kempf.pipeline.diagnose.steps.confirm import BIC_SAVING, Confirmation, Unseen, price_of, unpredicted, unseen
 from kempf.pipeline.diagnose.steps.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
-from kempf.pipeline.diagnose.steps.immaterial import Immaterial, weighed
+from kempf.pipeline.diagnose.steps.immaterial import LEAST_PART, Immaterial, weighed
 from kempf.pipeline.diagnose.steps.improves_prediction import worsens
 from kempf.pipeline.diagnose.steps.ladder import Ladder
 from kempf.pipeline.diagnose.steps.ladder_step import Step
 from kempf.pipeline.diagnose.steps.legs import candidate_in_std
 from kempf.pipeline.shooting.ahead import Ahead
+from kempf.pipeline.shooting.paired import paired
 from kempf.schemas.effect import Effect
 
 #: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
@@ -140,8 +142,10 @@ def _kept(
     for pair in best:
         effect = pair[0].effect
         ahead = ladder.ahead(last, effect)
-        if _worse(last.ahead, ahead):
+        if _worse(last.ahead, ahead) or _raises(last.ahead, ahead):
             findings.suspected[effect.name] = "it makes the prediction one leg ahead worse"
+        elif _is_nothing_by_legs(ladder, ahead, pair):
+            findings.suspected[effect.name] = "fitted to legs, its size is within two standard errors of nothing"
         else:
             kept.append((pair, ahead))
     return kept
@@ -150,6 +154,22 @@ def _kept(
 def _worse(before: Ahead | None, after: Ahead | None) -> bool:
     """Return whether a model predicts legs worse than another, or diverges where that does not."""
     return before is not None and (after is None or worsens(before, after))
+
+
+def _raises(before: Ahead | None, after: Ahead | None) -> bool:
+    """Return whether the misfit of manoeuvres left out rises by as much as an effect that matters lets it fall."""
+    return before is not None and after is not None and paired(before.left_out, after.left_out).falls_by < -LEAST_PART
+
+
+def _is_nothing_by_legs(ladder: Ladder, ahead: Ahead | None, pair: tuple[Candidate, Confirmation]) -> bool:
+    """Return whether predictions would take the parameters fitted to legs, and by these there is nothing of it.
+
+    Of an error of an instrument legs say little: what the likelihood says of it stands.
+    """
+    effect, fit = pair[0].effect, pair[1].fit
+    if ladder.shooting is None or ahead is None or effect.group == "sensor" or is_sized(ahead, effect):
+        return False
+    return ladder.shooting.beside(ahead, fit).disagrees is not None
 
 
 def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:

@@ -22,7 +22,7 @@ from kempf.schemas.effect import Effect
 #: members of a set that are refitted by likelihood at most
 _MEMBERS = 4
 #: manoeuvres, fitted and held out, from which predictions choose
-_FEWEST = 3
+FEWEST = 3
 #: standard errors from nothing within which an effect may be taken out again
 _SEEN = 2.0
 
@@ -34,7 +34,7 @@ def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
 
     Of two manoeuvres each would have to be predicted by the other alone: too few to choose by.
     """
-    if len(steps[0].fit.runs) + len(ladder.held) < _FEWEST:
+    if len(steps[0].fit.runs) + len(ladder.held) < FEWEST:
         return steps
     seen = set[frozenset[str]]()
     while ladder.shooting is not None and len(steps) <= ladder.settings.most_steps:
@@ -175,12 +175,12 @@ def _idle(ladder: Ladder, steps: Sequence[Step]) -> Effect | None:
     for step in steps[1:-1]:
         assert step.added is not None
         comparison = paired(ladder.shooting.without(now, step.added).left_out, now.left_out)
-        if comparison.in_std < ALIKE and (comparison.falls_by < LEAST_FALL or not _is_sized(now, step.added)):
+        if comparison.in_std < ALIKE and (comparison.falls_by < LEAST_FALL or not is_sized(now, step.added)):
             return step.added
     return None
 
 
-def _is_sized(ahead: Ahead, effect: Effect) -> bool:
+def is_sized(ahead: Ahead, effect: Effect) -> bool:
     """Return whether a parameter of an effect is more than two standard errors from nothing."""
     own = ahead.model.own(effect.name)
     return bool(np.any(np.abs(ahead.fit.values[own]) > _SEEN * ahead.std[-ahead.fit.values.size :][own]))

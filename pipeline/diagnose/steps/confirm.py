@@ -57,7 +57,8 @@ class Confirmation:
     likelihood_ratio: float
     #: Negative where the effect is worth its parameters.
     bic_change: float
-    #: Shape (runs,). Log-likelihood gained in each fitted run by parameters that did not see it, to first order.
+    #: Shape (runs,). Log-likelihood gained in each fitted run by parameters that did not see it, to first order; of a
+    #: single run, which nothing else says anything of, 0.
     fold_gains: Float
     #: Shape (held,). The same in the held-out runs.
     held_out_gains: Float
@@ -93,7 +94,7 @@ class Confirmation:
     def predicts(self) -> bool:
         """Whether it gains in most runs that it was not fitted to, and in all of them together."""
         gains = self._gains()
-        return bool(np.mean(gains > 0.0) > 0.5 and np.sum(gains) > 0.0)
+        return bool(2 * np.sum(gains > 0.0) > gains.size and np.sum(gains) > 0.0)
 
     @property
     def gained_in(self) -> tuple[int, int]:
@@ -101,14 +102,21 @@ class Confirmation:
         gains = self._gains()
         return int(np.sum(gains > 0.0)), gains.size
 
+    @property
+    def gains_left_out(self) -> Float:
+        """``fold_gains`` of runs that others say something of: empty where there is one alone."""
+        return self.fold_gains if self.fold_gains.size > 1 else self.fold_gains[:0]
+
     def _gains(self) -> Float:
-        result: Float = np.concatenate([self.fold_gains, self.held_out_gains])
+        result: Float = np.concatenate([self.gains_left_out, self.held_out_gains])
         return result
 
 
 def unpredicted(confirmation: Confirmation) -> str:
     """Say in how few manoeuvres an effect gains that it was not fitted to."""
     better, every = confirmation.gained_in
+    if not every:
+        return "one manoeuvre alone does not confirm it"
     if 2 * better > every:
         worse = every - better
         return f"of {every} manoeuvres that it was not fitted to it predicts {better} better and {worse} worse by more"

@@ -135,7 +135,7 @@ def _refit(candidate: Candidate, confirmation: Confirmation, size: Size | None =
         "widened": size.widened,
         "likelihood_ratio": confirmation.likelihood_ratio,
         "bic_change": confirmation.bic_change,
-        "gains_left_out": confirmation.fold_gains,
+        "gains_left_out": confirmation.gains_left_out,
         "gains_held_out": confirmation.held_out_gains,
         "at_bound": confirmation.at_bound,
         "converged": confirmation.fit.converged,

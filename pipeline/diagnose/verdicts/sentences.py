@@ -18,6 +18,7 @@ from kempf.pipeline.diagnose.verdicts.sizes import sized_by_refit, stated
 from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, verdict
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
+from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.enumeration import at_the_beginning, counted, listed
 
 #: share of the misfit below which nothing of it is explained
@@ -57,13 +58,14 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         (candidate, best), *_ = immaterial.chosen_from
         lines.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(immaterial)}.")
     if outcome == "insufficient_data":
+        few = "One manoeuvre alone" if diagnosis.before is None else "Two manoeuvres"
         lines.append(
-            "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "
-            "at two rudder angles, on two headings."
+            f"{few} cannot distinguish an effect from chance: sail at least three zigzags, to both sides, at two "
+            "rudder angles, on two headings."
         )
     if outcome == "adequate":
         lines.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
-    if diagnosis.something_left and diagnosis.after is not None:
+    if outcome != "insufficient_data" and diagnosis.something_left and diagnosis.after is not None:
         if outcome == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
             lines.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
@@ -79,6 +81,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             lines.append(f"Exploratory, not a finding; a formula to try: {terms}.")
     if len(diagnosis.steps) == 1 and outcome != "insufficient_data":
         lines += _left(diagnosis)
+        lines += _disagreement(diagnosis.steps[0].ahead, "")
     return lines
 
 
@@ -168,13 +171,18 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
             f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {explained} is explained{rest}."
         )
     lines += _left(diagnosis)
-    if last.disagrees is not None:
-        lines.append(
-            f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
-            f"{100.0 * last.disagrees.falls_by:.0f} % smaller, so that something is still lacking; predictions of "
-            "manoeuvres take those."
-        )
-    return lines
+    return lines + _disagreement(last, "still ")
+
+
+def _disagreement(model: Ahead | None, still: str) -> list[str]:
+    """Say by how much legs are predicted better by the parameters fitted to them than by the likelihood's."""
+    if model is None or model.disagrees is None:
+        return []
+    return [
+        f"Fits one step and one leg ahead {still}disagree: with parameters fitted to legs the misfit is "
+        f"{100.0 * model.disagrees.falls_by:.0f} % smaller, so that something is {still}lacking; predictions of "
+        "manoeuvres take those."
+    ]
 
 
 def _fall(first: Step, last: Step) -> str:

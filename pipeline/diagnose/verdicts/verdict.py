@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import isfinite
 from typing import Literal
 
+from kempf.pipeline.diagnose.steps.by_prediction import FEWEST
 from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
 from kempf.pipeline.shooting.ahead import Ahead
 
@@ -13,17 +14,19 @@ Verdict = Literal["adequate", "explained", "ambiguous", "partly_explained", "une
 
 def verdict(diagnosis: Diagnosis) -> Verdict:
     """Return what the diagnosis comes to."""
-    if diagnosis.before is None:
+    nothing_claimed = len(diagnosis.steps) == 1
+    if diagnosis.before is None or (nothing_claimed and len(diagnosis.fitted) + len(diagnosis.held) < FEWEST):
+        # of two manoeuvres predictions do not choose, so that nothing is known of most effects
         return "insufficient_data"
     if diagnosis.something_left:
-        return "partly_explained" if len(diagnosis.steps) > 1 else "unexplained"
+        return "unexplained" if nothing_claimed else "partly_explained"
     sizes = [len(step.chosen_from) for step in diagnosis.steps[1:]]
-    if not sizes:
-        return "adequate"
     last = diagnosis.steps[-1].ahead
     if last is not None and last.disagrees is not None:
         # the flexible reference, one step ahead, may see nothing left: disturbances carry it
-        return "partly_explained"
+        return "unexplained" if nothing_claimed else "partly_explained"
+    if nothing_claimed:
+        return "adequate"
     return "explained" if max(sizes) == 1 else "ambiguous"
 
 
