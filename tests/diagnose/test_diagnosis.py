@@ -424,9 +424,37 @@ def test_an_effect_that_is_nothing_by_the_fit_that_predicts_is_not_claimed(
     effect: str, size: tuple[float, ...], disagrees: object, nothing: bool
 ) -> None:
     ahead = with_left_out([1.0] * 3, size, disagrees)
-    ladder = cast(Ladder, SimpleNamespace(shooting=SimpleNamespace(beside=lambda ahead, _: ahead)))
+    last = cast(Step, SimpleNamespace(fit=object()))
+    shooting = SimpleNamespace(beside=lambda ahead, _: ahead)
+    ladder = cast(Ladder, SimpleNamespace(shooting=shooting, probe=last.fit))
     pair = (cast(Candidate, SimpleNamespace(effect=effects.get(effect))), refitted())
-    assert by_likelihood._is_nothing_by_legs(ladder, ahead, pair) == nothing
+    assert by_likelihood._is_nothing_by_legs(ladder, last, ahead, pair) == nothing
+
+
+def test_legs_are_held_against_the_refit_without_what_is_immaterial(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They are not fitted with it: the refit beside it has parameters that they lack."""
+    ahead, last, alone = (
+        with_left_out([1.0] * 3, (0.5,), object()),
+        cast(Step, SimpleNamespace(fit=object())),
+        refitted(),
+    )
+    asked = []
+
+    def beside(ahead: Ahead, fit: object) -> Ahead:
+        asked.append(fit)
+        return ahead
+
+    ladder = SimpleNamespace(
+        shooting=SimpleNamespace(beside=beside),
+        probe=object(),
+        unseen=lambda _: None,
+        workers=None,
+        confirmed=lambda base, *_: alone if base is last.fit else None,
+    )
+    monkeypatch.setattr(by_likelihood, "score", lambda *_: None)
+    pair = (cast(Candidate, SimpleNamespace(effect=effects.get("rudder_lag"))), refitted())
+    assert by_likelihood._is_nothing_by_legs(cast(Ladder, ladder), last, ahead, pair)
+    assert asked == [alone.fit] and alone.fit is not pair[1].fit
 
 
 def test_a_model_whose_fits_disagree_is_not_adequate(calm: tuple[Sailed, Diagnosis]) -> None:

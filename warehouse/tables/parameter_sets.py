@@ -362,9 +362,9 @@ def converged(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict
 def convergences_to_look_at(
     warehouse: Warehouse, vessel: str | None, code: str | None = None, names: Collection[str] | None = None
 ) -> list[Convergence]:
-    """Return how the search ended for the sets of one vessel or of all that a person should look at, sorted by id.
+    """Return how the search ended for sets, of one vessel or of all, that need a person's attention, sorted by id.
 
-    The search did not converge, or the set leaves segments out, or its separate hulls are not one.
+    The search did not converge, segments are left out, or the manoeuvres do not share one hull.
 
     Parameters
     ----------

@@ -56,9 +56,8 @@ def _print_candidate(document: Mapping[str, Any]) -> None:
         for parameter, value in refit["parameters"].items():
             shown = f"  {parameter} = {number(value['value'])} ± {number(value['std'], 2)} {value['unit']}"
             click.echo(shown.rstrip())
-        click.echo(
-            f"  refitted: BIC {number(refit['bic_change'], 3)}, {refit['better']} of {refit['of']} manoeuvres better"
-        )
+        better = f", {refit['better']} of {refit['of']} manoeuvres better" if refit["of"] else ""
+        click.echo(f"  refitted: BIC {number(refit['bic_change'], 3)}{better}")
     kept = bool(document["sets"])
     if document["immaterial"]:
         click.echo(f"  it holds, but is immaterial: {candidate['why']}")

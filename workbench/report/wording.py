@@ -16,6 +16,8 @@ from kempf.schemas.enumeration import as_words, counted, listed
 
 #: the verdicts that claim an effect
 CLAIMING = ("explained", "ambiguous", "partly_explained")
+#: share of the misfit below which nothing of it is explained, as in the sentences of a diagnosis
+_LEAST_SHARE = 0.005
 _EFFECT_VERDICTS = {
     "present": "present",
     "immaterial": "certain but immaterial",
@@ -128,7 +130,7 @@ def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
 
 def _share(content: Mapping[str, Any]) -> str:
     share = content.get("share_explained")
-    if share is None or share <= 0.0:
+    if share is None or share < _LEAST_SHARE:
         return ""
     return f", which explains {100.0 * share:.0f} % of the misfit one leg ahead"
 

@@ -137,14 +137,14 @@ def _refitted(ladder: Ladder, findings: LikelihoodFindings) -> list[tuple[Candid
 def _kept(
     ladder: Ladder, findings: LikelihoodFindings, best: Sequence[tuple[Candidate, Confirmation]]
 ) -> list[tuple[tuple[Candidate, Confirmation], Ahead | None]]:
-    """Return those of the best that make no prediction one leg ahead worse, with the model one leg ahead."""
+    """Return those of the best that legs have nothing against, with the model one leg ahead."""
     last, kept = findings.steps[-1], []
     for pair in best:
         effect = pair[0].effect
         ahead = ladder.ahead(last, effect)
         if _worse(last.ahead, ahead) or _raises(last.ahead, ahead):
             findings.suspected[effect.name] = "it makes the prediction one leg ahead worse"
-        elif _is_nothing_by_legs(ladder, ahead, pair):
+        elif _is_nothing_by_legs(ladder, last, ahead, pair):
             findings.suspected[effect.name] = "fitted to legs, its size is within two standard errors of nothing"
         else:
             kept.append((pair, ahead))
@@ -161,7 +161,7 @@ def _raises(before: Ahead | None, after: Ahead | None) -> bool:
     return before is not None and after is not None and paired(before.left_out, after.left_out).falls_by < -LEAST_PART
 
 
-def _is_nothing_by_legs(ladder: Ladder, ahead: Ahead | None, pair: tuple[Candidate, Confirmation]) -> bool:
+def _is_nothing_by_legs(ladder: Ladder, last: Step, ahead: Ahead | None, pair: tuple[Candidate, Confirmation]) -> bool:
     """Return whether predictions would take the parameters fitted to legs, and by these there is nothing of it.
 
     Of an error of an instrument legs say little: what the likelihood says of it stands.
@@ -169,6 +169,9 @@ def _is_nothing_by_legs(ladder: Ladder, ahead: Ahead | None, pair: tuple[Candida
     effect, fit = pair[0].effect, pair[1].fit
     if ladder.shooting is None or ahead is None or effect.group == "sensor" or is_sized(ahead, effect):
         return False
+    if ladder.probe is not last.fit:
+        # without what is immaterial, which legs are not fitted with
+        fit = ladder.confirmed(last.fit, ladder.unseen(last), score(last.fit, effect, ladder.workers)).fit
     return ladder.shooting.beside(ahead, fit).disagrees is not None
 
 

@@ -50,6 +50,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if len(diagnosis.steps) > 1:
         lines += _ahead(diagnosis)
         lines.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+    if outcome == "insufficient_data":
+        return [*lines, _too_few(diagnosis)]
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
         size = sized_by_refit(candidate.effect, best)
@@ -57,15 +59,9 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     for immaterial in diagnosis.immaterial:
         (candidate, best), *_ = immaterial.chosen_from
         lines.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(immaterial)}.")
-    if outcome == "insufficient_data":
-        few = "One manoeuvre alone" if diagnosis.before is None else "Two manoeuvres"
-        lines.append(
-            f"{few} cannot distinguish an effect from chance: sail at least three zigzags, to both sides, at two "
-            "rudder angles, on two headings."
-        )
     if outcome == "adequate":
         lines.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
-    if outcome != "insufficient_data" and diagnosis.something_left and diagnosis.after is not None:
+    if diagnosis.something_left and diagnosis.after is not None:
         if outcome == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
             lines.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
@@ -79,10 +75,19 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         if diagnosis.after.formula:
             terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
             lines.append(f"Exploratory, not a finding; a formula to try: {terms}.")
-    if len(diagnosis.steps) == 1 and outcome != "insufficient_data":
+    if len(diagnosis.steps) == 1:
         lines += _left(diagnosis)
         lines += _disagreement(diagnosis.steps[0].ahead, "")
     return lines
+
+
+def _too_few(diagnosis: Diagnosis) -> str:
+    few = (
+        "One manoeuvre alone cannot distinguish an effect from chance"
+        if diagnosis.before is None
+        else "Two manoeuvres are too few to choose an effect by its predictions"
+    )
+    return f"{few}: sail at least three zigzags, to both sides, at two rudder angles, on two headings."
 
 
 def _given(diagnosis: Diagnosis) -> list[str]:

@@ -118,7 +118,7 @@ class Bounded(Protocol):
 
 
 def pressed(at: Float, low: Float, high: Float, score: Float) -> Mask:
-    """Return which elements are at a bound that their score would have them leave, shape (n,)."""
+    """Return which elements are at a bound, and their score drives them beyond it, shape (n,)."""
     against: Mask = ((at <= low) & (score < 0.0)) | ((at >= high) & (score > 0.0))
     return against
 
