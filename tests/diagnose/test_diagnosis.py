@@ -431,7 +431,7 @@ def test_an_effect_that_is_nothing_by_the_fit_that_predicts_is_not_claimed(
     assert by_likelihood._is_nothing_by_legs(ladder, last, ahead, pair) == nothing
 
 
-def test_legs_are_held_against_the_refit_without_what_is_immaterial(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_legs_are_held_against_the_refit_without_what_is_immaterial() -> None:
     """They are not fitted with it: the refit beside it has parameters that they lack."""
     ahead, last, alone = (
         with_left_out([1.0] * 3, (0.5,), object()),
@@ -447,11 +447,8 @@ def test_legs_are_held_against_the_refit_without_what_is_immaterial(monkeypatch:
     ladder = SimpleNamespace(
         shooting=SimpleNamespace(beside=beside),
         probe=object(),
-        unseen=lambda _: None,
-        workers=None,
-        confirmed=lambda base, *_: alone if base is last.fit else None,
+        refitted=lambda rung, effect: (effect, alone) if rung is last else None,
     )
-    monkeypatch.setattr(by_likelihood, "score", lambda *_: None)
     pair = (cast(Candidate, SimpleNamespace(effect=effects.get("rudder_lag"))), refitted())
     assert by_likelihood._is_nothing_by_legs(cast(Ladder, ladder), last, ahead, pair)
     assert asked == [alone.fit] and alone.fit is not pair[1].fit

@@ -16,8 +16,6 @@ from kempf.schemas.enumeration import as_words, counted, listed
 
 #: the verdicts that claim an effect
 CLAIMING = ("explained", "ambiguous", "partly_explained")
-#: share of the misfit below which nothing of it is explained, as in the sentences of a diagnosis
-_LEAST_SHARE = 0.005
 _EFFECT_VERDICTS = {
     "present": "present",
     "immaterial": "certain but immaterial",
@@ -129,10 +127,8 @@ def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
 
 
 def _share(content: Mapping[str, Any]) -> str:
-    share = content.get("share_explained")
-    if share is None or share < _LEAST_SHARE:
-        return ""
-    return f", which explains {100.0 * share:.0f} % of the misfit one leg ahead"
+    percent = round(100.0 * (content.get("share_explained") or 0.0))
+    return f", which explains {percent} % of the misfit one leg ahead" if percent > 0 else ""
 
 
 def _next_steps(

@@ -56,6 +56,11 @@ class Request:
                 f"Take the estimator {SINGLE!r}, or a model without effects.",
             )
 
+    @property
+    def looks_beside(self) -> bool:
+        """Whether a segment without a speed through the water is identified with others beside it."""
+        return self.estimator in CAN and not self.spec.effects
+
     @cached_property
     def all_settings(self) -> dict[str, Any]:
         """Every setting of the estimator, defaults included; they are part of a set's identity."""
@@ -205,7 +210,6 @@ def _wanted(
     warehouse: Warehouse, request: Request, readable: Sequence[Segment], by_ingest: Mapping[str, logs.LogRow]
 ) -> list[_Wanted]:
     """Return what is wanted of every segment, in order of time."""
-    alone = request.estimator not in CAN or bool(request.spec.effects)
     hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
     profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
     code = code_of(warehouse, "estimate")
@@ -215,7 +219,7 @@ def _wanted(
     tasks = []
     for (sha256, logless), hers in alike.items():
         common = _common_inputs(sha256, request, code, logless=logless)
-        if logless and not alone:
+        if logless and request.looks_beside:
             for segment in hers:
                 beside = tuple(companions_of(segment, readable, by_ingest))
                 name = parameter_set_id(_with(common, segment, beside))
@@ -291,7 +295,7 @@ def inputs_of(
 def _common_inputs(profile_sha256: str, request: Request, code: str, *, logless: bool) -> Inputs:
     """Return what sets of single segments are a function of beside these: of segments that all have a log, or none."""
     settings = request.all_settings
-    if request.estimator in CAN and logless and not request.spec.effects:
+    if logless and request.looks_beside:
         settings = {**settings, KEY: no_log_settings(dict(request.no_log))}
     return Inputs(
         log_ids=(),

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from kempf.pipeline.diagnose.screening.forward_selection import is_ship
-from kempf.pipeline.diagnose.screening.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.screening.screen import Candidate, screen
 from kempf.pipeline.diagnose.steps.by_prediction import is_sized
 from kempf.pipeline.diagnose.steps.confirm import BIC_SAVING, Confirmation, Unseen, price_of, unpredicted, unseen
 from kempf.pipeline.diagnose.steps.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
@@ -66,12 +66,11 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> LikelihoodFindings:
             continue
         if before is not last.fit:
             # the ladder goes on without what is immaterial
-            beside = score(last.fit, candidate.effect, ladder.workers)
-            again = ladder.confirmed(last.fit, ladder.unseen(last), beside)
-            if not again.holds:
+            again = ladder.refitted(last, candidate.effect)
+            if not again[1].holds:
                 findings.suspected[candidate.effect.name] = "without what is immaterial beside it nothing of it holds"
                 continue
-            pairs = ((beside, again), *pairs[1:])
+            pairs = (again, *pairs[1:])
         findings.steps.append(ladder.stepped(pairs, worse, ahead, None))
         climbed, idle = findings.steps[-1].fit, _idle(findings.steps)
         if idle is not None:
@@ -171,7 +170,7 @@ def _is_nothing_by_legs(ladder: Ladder, last: Step, ahead: Ahead | None, pair: t
         return False
     if ladder.probe is not last.fit:
         # without what is immaterial, which legs are not fitted with
-        fit = ladder.confirmed(last.fit, ladder.unseen(last), score(last.fit, effect, ladder.workers)).fit
+        fit = ladder.refitted(last, effect)[1].fit
     return ladder.shooting.beside(ahead, fit).disagrees is not None
 
 

@@ -55,6 +55,11 @@ class Ladder:
             self.refits[base, name] = confirmation
         return confirmation
 
+    def refitted(self, last: Step, effect: Effect) -> tuple[Candidate, Confirmation]:
+        """Refit the model of a rung with one effect more, of which that rung's screen need not know."""
+        candidate = score(last.fit, effect, self.workers)
+        return candidate, self.confirmed(last.fit, self.unseen(last), candidate)
+
     def unseen(self, step: Step) -> Unseen:
         """Return how a rung predicts what it did not see; its confirmation has asked that already."""
         if step.chosen_from and step.chosen_from[0][1].fit is step.fit:
@@ -106,11 +111,9 @@ class Ladder:
         self.listener.begins(f"{last.title} in place of {step.added.title}")
         at = next(number for number, rung in enumerate(steps) if rung is step)
         below, kept = list(steps[:at]), [rung for rung in steps[at + 1 : -1] if rung.added is not None]
-        candidate = score(below[-1].fit, last, self.workers)
-        confirmation = self.confirmed(below[-1].fit, self.unseen(below[-1]), candidate)
         others = tuple(pair for pair in step.chosen_from if pair[0].effect.name != last.name)
         refused = tuple(pair for pair in step.refused if pair[0].effect.name != last.name)
-        again = self.stepped(((candidate, confirmation), *others), refused, ahead, step.stability)
+        again = self.stepped((self.refitted(below[-1], last), *others), refused, ahead, step.stability)
         names = {step.added.name: last.name}
         below = [replace(rung, together=_renamed(rung.together, names)) for rung in below]
         again = replace(again, together=_renamed(step.together, names))
@@ -133,10 +136,8 @@ class Ladder:
         ]
         for step in kept:
             assert step.added is not None
-            candidate = score(rungs[-1].fit, step.added, self.workers)
-            confirmation = self.confirmed(rungs[-1].fit, self.unseen(rungs[-1]), candidate)
-            ahead = self.ahead(rungs[-1], step.added)
-            again = self.stepped(((candidate, confirmation),), tuple(refused), ahead, step.stability)
+            pair, ahead = self.refitted(rungs[-1], step.added), self.ahead(rungs[-1], step.added)
+            again = self.stepped((pair,), tuple(refused), ahead, step.stability)
             rungs.append(replace(again, together=_renamed(step.together, names)))
         return rungs
 
