@@ -8,13 +8,19 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
+
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
-from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
+from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.units import SECOND_NS
 from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import readings, vessels
+from kempf.warehouse.tables.parameter_set import Bounds
 
 _PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
 
@@ -108,6 +114,23 @@ def _laid_out(ship: Ship) -> VesselRuns:
         warehouse = Warehouse(str(Path(folder) / "warehouse"))
         take_in(warehouse, ship)
         return assembled(warehouse, choose(warehouse, ship.name), default_model_of(warehouse, ship.name))
+
+
+def thinned(ship: Ship, row_s: float) -> VesselRuns:
+    """Lay the manoeuvres of a ship out from a part of the rows of her logs, so far apart."""
+    with TemporaryDirectory() as folder:
+        warehouse = Warehouse(str(Path(folder) / "warehouse"))
+        take_in(warehouse, ship)
+        chosen = choose(warehouse, ship.name)
+        instruments = {}
+        for log_id, ingest_id in chosen.ingests.items():
+            with readings.lent(warehouse, ingest_id) as rows:
+                whole = rows.collect()
+            apart_s = float(np.median(np.diff(whole["time_utc_ns"].to_numpy()))) / SECOND_NS
+            instruments[log_id] = from_readings(whole.gather_every(round(row_s / apart_s)))
+        bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
+        profile = vessels.get(warehouse, chosen.profile_sha256)
+        return assemble(instruments, profile, bounds, default_model_of(warehouse, ship.name))
 
 
 def ordered(file_name: str) -> Run:

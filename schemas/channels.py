@@ -13,6 +13,8 @@ from typing import Literal
 
 #: How the values of a channel wrap: round the whole circle, not at all.
 Wrap = Literal["circle", "none"]
+#: The source of every reading of delimited text; those of other logs are the names of sentences and topics.
+ROW = "row"
 
 
 @dataclass(frozen=True)

@@ -81,7 +81,7 @@ def compared(number: int) -> tuple[list[Circle], tuple[int, int]]:
     found: list[Circle] = []
     own = (0, 0)
     with TemporaryDirectory() as folder:
-        warehouse = taken_in(hull, number, Path(folder), stamped=True)
+        warehouse = taken_in(hull, number, Path(folder))
         pool_vessel(warehouse, hull.name, Request(), identify_vessel(warehouse, hull.name))
         ingest(warehouse, [circles(hull, number, Path(folder))], hull.name)
         for rudder_deg in map(abs, RUDDERS_DEG):

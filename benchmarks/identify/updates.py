@@ -20,6 +20,7 @@ import numpy as np
 from benchmarks import measured_ships, result_page
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
+from kempf.flows.jobs.identify.errors_of_fit import errors_of
 from kempf.flows.jobs.identify.update_model import FEWEST, GROWN
 from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
@@ -29,7 +30,7 @@ from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.estimate.posterior import Posterior, posterior_of
-from kempf.pipeline.estimate.updated import updated
+from kempf.pipeline.estimate.updated import Updated, updated
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
@@ -37,7 +38,12 @@ from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.warehouse.storage.store import Warehouse
 
 _DAY_NS = 86_400_000_000_000
-HULLS = ("mariner", "container", "tanker", "ferry", "usv")
+#: Hulls, and the rate at which their logs repeat what the instruments said last, Hz: the slower, the less is known of
+#: the instants of measurement.
+SIMULATED = (
+    *((hull, 10.0) for hull in ("mariner", "container", "tanker", "ferry", "usv")),
+    *((hull, 2.0) for hull in ("mariner", "container", "tanker", "ferry")),
+)
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,13 @@ class Outcome:
 
 
 def _left(fit: PooledFit) -> Posterior:
-    return posterior_of(fit, uncertainty_of(fit), agreement_of(fit), fit.log_likelihood)
+    errors = errors_of(fit, uncertainty_of(fit))
+    return posterior_of(fit, errors.fit, errors.together, agreement_of(fit), fit.log_likelihood, errors.late)
+
+
+def _left_then(made: Updated) -> Posterior:
+    errors = errors_of(made.fit, made.known, made.step)
+    return posterior_of(made.logged, errors.fit, errors.together, made.agreement, made.log_likelihood, errors.late)
 
 
 def _anew(runs: VesselRuns, count: int, workers: Executor) -> PooledFit:
@@ -74,13 +86,13 @@ def compare(ship: str, runs: VesselRuns, first: int, last: int, workers: Executo
     left, model, anew, took = _left(fit), fit.model, 0, 0.0
     for count in range(first, last):
         began = process_time()
-        made = updated(left, model, [runs.runs[count]], runs.spec, workers) if left.usable else None
+        made = updated(left, model, [runs.runs[count]], runs.spec, workers)
         took = process_time() - began
         if made is None:
             fit = _anew(runs, count + 1, workers)
             left, model, anew = _left(fit), fit.model, anew + 1
         else:
-            left = posterior_of(made.fit, made.known, made.agreement, made.log_likelihood)
+            left = _left_then(made)
     began = process_time()
     whole = _anew(runs, last, workers)
     took_whole = process_time() - began
@@ -94,15 +106,15 @@ def compare(ship: str, runs: VesselRuns, first: int, last: int, workers: Executo
     return Outcome(ship, first, last, same, anew, off, widest, agrees, (took, took_whole))
 
 
-def simulated(hull: str, count: int) -> VesselRuns:
-    """Sail a ship on so many days and lay the zigzags out."""
+def simulated(hull: str, rate_hz: float, count: int) -> VesselRuns:
+    """Sail a ship on so many days and lay the zigzags out, logged at a rate."""
     with TemporaryDirectory() as folder:
         warehouse = Warehouse(str(Path(folder) / "warehouse"))
         for day in range(count):
             angle = (10.0, 20.0)[day % 2]
             settings = zigzag_settings(hull, heading_deg=angle, rudder_deg=angle, duration_s=900.0, seed=500 + day)
             settings = replace(settings, start_utc_ns=settings.start_utc_ns + day * _DAY_NS)
-            log = LogFile(to_csv(simulate_trial(settings), rate_hz=10.0))
+            log = LogFile(to_csv(simulate_trial(settings), rate_hz=rate_hz))
             ingest_log(warehouse, hull, f"day{day}.csv.gz", log, logger_profile(settings), hull)
         return assembled(warehouse, choose(warehouse, hull), default_model_of(warehouse, hull))
 
@@ -145,11 +157,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
             if len(runs.runs) >= 4:
                 outcomes.append(compare(name, runs, len(runs.runs) // 2, len(runs.runs), workers))
                 print(outcomes[-1], flush=True)
-        for hull in HULLS:
-            runs = simulated(hull, asked.runs)
+        for hull, rate_hz in SIMULATED:
+            runs = simulated(hull, rate_hz, asked.runs)
             for first, last in ((2, 4), (FEWEST, int(GROWN * FEWEST))):
                 if last <= len(runs.runs):
-                    outcomes.append(compare(f"{hull}, simulated", runs, first, last, workers))
+                    outcomes.append(compare(f"{hull}, simulated, {rate_hz:g} Hz", runs, first, last, workers))
                     print(outcomes[-1], flush=True)
     result_page.write("identify.updates", "Fits brought forward", page(outcomes))
 

@@ -25,7 +25,7 @@ _REGULAR = 0.9
 _ONE_STEP = 0.9
 #: standard deviation of what lies anywhere between 0 and 1; share of the scatter on either side that is left out;
 #: part of a row that is never known
-_WITHIN, _SCATTER, _BENT = 12.0**-0.5, 0.025, 0.3
+WITHIN, _SCATTER, _BENT = 12.0**-0.5, 0.025, 0.3
 #: part of a row by which scatter must lean to one side before it says that few measurements cross an edge
 _LOPSIDED = 0.1
 #: samples over which an instrument's clock is taken for steady
@@ -113,7 +113,7 @@ def _instants(time_utc_ns: Nanoseconds, rows: NDArray[np.int64], period: int) ->
     blocks = [_steady(middle[first : first + _BLOCK], period * row_ns, row_ns) for first in range(0, rows.size, _BLOCK)]
     instants = np.concatenate([block for block, _ in blocks])
     if not bool(np.all(np.diff(instants) > 0)):
-        return middle, row_ns * _WITHIN / SECOND_NS
+        return middle, row_ns * WITHIN / SECOND_NS
     # the last block may be short, and its clock unknown
     sizes = [block.size for block, _ in blocks]
     variance = np.average([std_ns**2 for _, std_ns in blocks], weights=sizes)
@@ -132,7 +132,7 @@ def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> tuple[Nanos
         where the line may lie.
     """
     if middle.size < _MIN_RUNS:
-        return middle, row_ns * _WITHIN
+        return middle, row_ns * WITHIN
     elapsed = (middle - middle[0]).astype(np.float64)
     apart = np.diff(elapsed) / period_ns
     # neighbours are one tick apart even where a sample slipped into the next row; a longer pause lost samples
@@ -140,14 +140,14 @@ def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> tuple[Nanos
     slope, offset = np.polyfit(ticks, elapsed, 1)
     steady = slope * ticks + offset
     if np.max(np.abs(steady - elapsed)) > 1.2 * row_ns:
-        return middle, row_ns * _WITHIN
+        return middle, row_ns * WITHIN
     # a message that came late for once says nothing of the clock
     low, high = np.quantile(elapsed - steady, [_SCATTER, 1.0 - _SCATTER])
     # and a clock that crosses one edge only, in all its time, bends the line
-    std_ns = max(_BENT * row_ns, row_ns - float(high - low)) * _WITHIN
+    std_ns = max(_BENT * row_ns, row_ns - float(high - low)) * WITHIN
     edge = 0.5 * float(low + high)
     if abs(edge) > _LOPSIDED * row_ns:
         # few measurements cross an edge: jitter over a whole row puts the clock on the line, none at all on the edge
-        steady, std_ns = steady + 0.5 * edge, float(np.hypot(std_ns, edge * _WITHIN))
+        steady, std_ns = steady + 0.5 * edge, float(np.hypot(std_ns, edge * WITHIN))
     result: Nanoseconds = middle[0] + np.round(steady).astype(np.int64)
     return result, std_ns

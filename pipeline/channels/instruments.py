@@ -14,12 +14,14 @@ import polars as pl
 
 from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
-from kempf.pipeline.channels.holds import find_held
+from kempf.pipeline.channels.holds import WITHIN, Held, find_held
 from kempf.pipeline.channels.second_instrument import difference
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 from kempf.pipeline.channels.there_and_back import LEAPING, leaps, said
-from kempf.schemas.channels import CHANNELS
+from kempf.schemas.channels import CHANNELS, ROW
+from kempf.schemas.enumeration import listed
 from kempf.schemas.nmea import SENTENCES
+from kempf.schemas.units import SECOND_NS
 
 #: channels that one instrument measures at one instant, so that they share their rows
 _TOGETHER: tuple[tuple[str, ...], ...] = (
@@ -38,6 +40,8 @@ _OWN_CLOCK, _MAGNETIC = ("RMC", "GGA", "GLL"), ("HDG", "HDM")
 _REPEATS = ("II", "IN")
 #: share of the most frequent source's readings from which a better one is taken, and from which one is as frequent
 _ENOUGH, _AS_MANY = 0.25, 0.9
+#: rows so far apart, s, are as slow as receivers measure, give or take: in them nothing would show that it repeats
+_SLOW_S = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +56,7 @@ class Instruments:
     notes: tuple[str, ...]
     #: Channels that the log does not have and that were computed from others.
     derived: frozenset[str] = frozenset()
-    #: Standard error, s, of the instants of a channel that its log repeats in several rows, see
-    #: `kempf.pipeline.channels.holds.Held`.
+    #: Standard error, s, of the instants of a channel in rows that were written at a rate of their own (decision 0109).
     instant_std_s: dict[str, float] = field(default_factory=dict)
     #: Instants, UTC ns, of the readings of a channel that were left out, see
     #: `kempf.pipeline.channels.there_and_back.leaps`.
@@ -85,6 +88,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     sources: dict[str, str] = {}
     notes: list[str] = []
     unsure: dict[str, float] = {}
+    rows: dict[str, _Rows] = {}
     for group in groups:
         offered = counts.filter(pl.col(_name(group)) > 0)
         if offered.is_empty():
@@ -92,23 +96,62 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
             groups += [(name,) for name in group if len(group) > 1]
             continue
         source, others = _choose(dict(offered.select("source", _name(group)).iter_rows()))
-        held: list[str] = []
-        channels, std_s = _at_instants(group, *_of_one(frame, source, group), source, held)
+        own_notes: list[str] = []
+        channels, held, apart_s = _at_instants(group, *_of_one(frame, source, group), source, own_notes)
         if others:
             also = (_also(frame, other, group, channels) for other in others)
             notes.append(f"{' and '.join(group)} from {source}; also in {', '.join(also)}, not used")
-        notes += held
+        notes += own_notes
         series |= channels
         sources |= dict.fromkeys(channels, source)
-        if std_s > 0.0:
-            unsure |= dict.fromkeys(channels, std_s)
+        own_rows = rows.setdefault(source, _Rows(table=source == ROW))
+        own_rows.apart_s = min(own_rows.apart_s, apart_s)
+        if held.rows_per_value > 1:
+            own_rows.repeat = True
+            unsure |= dict.fromkeys(channels, held.std_s)
+        else:
+            own_rows.fresh += channels
     gaps, leaping = named_gaps(series), list[str]()
     left_out = _leave_out_leaps(series, leaping)
+    for source, own_rows in rows.items():
+        if own_rows.sampled and own_rows.fresh:
+            _put_in_the_middle(source, own_rows, series, notes)
+            unsure |= dict.fromkeys(own_rows.fresh, own_rows.apart_s * WITHIN)
     notes = [*gaps, *leaping, *notes]
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)
     return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure, left_out)
+
+
+@dataclass
+class _Rows:
+    """The rows of one source, by what its instruments show of them."""
+
+    #: Whether they are those of a table, and not messages that an instrument sends.
+    table: bool
+    #: How far they are apart, s.
+    apart_s: float = inf
+    #: Whether they repeat the last value of an instrument.
+    repeat: bool = False
+    #: Channels that are new in every row.
+    fresh: list[str] = field(default_factory=list)
+
+    @property
+    def sampled(self) -> bool:
+        """Whether they have instants of their own, and not those of their instruments (decision 0109)."""
+        return self.repeat or (self.table and _SLOW_S <= self.apart_s < inf)
+
+
+def _put_in_the_middle(source: str, rows: _Rows, series: dict[str, Series], notes: list[str]) -> None:
+    """Take what was measured at some time since the row before at the middle of that time."""
+    for name in rows.fresh:
+        series[name] = Series(series[name].time_utc_ns - round(0.5 * rows.apart_s * SECOND_NS), series[name].value)
+    why = "that repeat other instruments" if rows.repeat else "as slow as instruments measure"
+    notes.append(
+        f"{listed(rows.fresh)}: in rows of {rows.apart_s:.2g} s{'' if rows.table else f' of {source}'}, {why}: "
+        "measured at some time since the row before, of which the middle is taken"
+    )
 
 
 def _leave_out_leaps(series: dict[str, Series], notes: list[str]) -> dict[str, Nanoseconds]:
@@ -159,7 +202,7 @@ def _also(frame: pl.LazyFrame, source: str, group: tuple[str, ...], chosen: dict
     # two antennas are two places
     if "latitude" in group:
         return source
-    channels, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
+    channels, _, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
     found = {name: difference(name, chosen[name], channels[name]) for name in group}
     if len(set(found.values())) == 1:
         differ = next(iter(found.values()))
@@ -194,8 +237,8 @@ def _remoteness(source: str) -> tuple[bool, bool, bool]:
 
 def _at_instants(
     group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
-) -> tuple[dict[str, Series], float]:
-    """Return the series of a group and what is not known of their instants, s."""
+) -> tuple[dict[str, Series], Held, float]:
+    """Return the series of a group, in which rows its instrument measured, and how far these are apart, s."""
     # most logs are in order, and a long one is not copied for nothing
     if np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
@@ -207,7 +250,7 @@ def _at_instants(
     if held.rows_per_value > 1:
         notes.append(
             f"{' and '.join(group)}: each measurement is in {held.rows_per_value} rows"
-            f"{'' if source == 'row' else f' of {source}'}; "
+            f"{'' if source == ROW else f' of {source}'}; "
             f"kept {held.time_utc_ns.size} of {time.size} rows, at their instants of measurement"
         )
     result = {}
@@ -216,7 +259,7 @@ def _at_instants(
         if CHANNELS[name].wrap == "circle":
             value = np.unwrap(value)
         result[name] = Series(held.time_utc_ns, value)
-    return result, held.std_s
+    return result, held, Series(time, values[:, 0]).period_s
 
 
 def _add_from_the_bow(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:

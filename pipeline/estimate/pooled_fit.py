@@ -119,6 +119,11 @@ class PooledFit:
     iterations: int
 
     @property
+    def parameters(self) -> Float:
+        """Hull and effects, shape (6 + p,)."""
+        return np.concatenate([self.hull, self.values])
+
+    @property
     def std(self) -> Float:
         """Standard errors of hull and effects, shape (6 + p,)."""
         with np.errstate(invalid="ignore"):

@@ -3,6 +3,10 @@
 Beside it the runs need not be filtered again: the next run is fitted together with the parabola, as in a recursive
 estimate, where what is known of the parameters is a normal distribution (Ljung 1999, System Identification, sect. 11.2;
 Gelman et al. 2013, Bayesian Data Analysis, sect. 4.1 for the approximation).
+
+Two are left. A run is fitted with its instants of measurement as they are logged, and beside it the others count with
+theirs as logged, too (decision 0110): hundreds of runs know a hull so well that what the instants of one are off is
+many of their standard errors. A parameter set states the other one, with unsure instants free.
 """
 
 from __future__ import annotations
@@ -27,10 +31,13 @@ class Posterior:
 
     #: Of the parameters, hull first.
     names: tuple[str, ...]
-    #: Shape (q,). Where the log-likelihood is highest.
+    #: Shape (q,). Where the log-likelihood is highest with unsure instants of the runs free.
     point: Float
-    #: Shape (q, q). Inverse of the expected information, noise levels and unsure instants of the runs unknown.
+    #: Shape (q, q). Inverse of the expected information there, noise levels and unsure instants unknown.
     covariance: Float
+    #: Shapes (q,) and (q, q). The same with the instants as they are logged.
+    logged_point: Float
+    logged_covariance: Float
     #: Shape (q, q). Of the errors, where prediction errors are not white; else the same.
     stated: Float
     #: ``information`` or ``sandwich``.
@@ -41,14 +48,20 @@ class Posterior:
     log_likelihood: float
 
     @property
-    def parabola(self) -> Parabola:
-        """Of the log-likelihood."""
+    def freed(self) -> Parabola:
+        """Of the log-likelihood with unsure instants free."""
         return Parabola(self.point, inverse(self.covariance))
+
+    @property
+    def as_logged(self) -> Parabola:
+        """Of the log-likelihood with the instants as they are logged."""
+        return Parabola(self.logged_point, inverse(self.logged_covariance))
 
     @property
     def usable(self) -> bool:
         """Whether every parameter is known: one at a bound has no parabola."""
-        return bool(np.all(np.isfinite(self.covariance)) and np.all(np.isfinite(self.stated)))
+        parts = (self.covariance, self.logged_point, self.logged_covariance, self.stated)
+        return all(bool(np.all(np.isfinite(part))) for part in parts)
 
     def as_json(self) -> dict[str, Any]:
         """Return it as JSON content."""
@@ -56,6 +69,8 @@ class Posterior:
             "names": list(self.names),
             "point": self.point.tolist(),
             "covariance": self.covariance.tolist(),
+            "logged_point": self.logged_point.tolist(),
+            "logged_covariance": self.logged_covariance.tolist(),
             "stated": self.stated.tolist(),
             "kind": self.kind,
             "statistic": self.agreement.statistic,
@@ -65,14 +80,14 @@ class Posterior:
 
 
 def from_json(content: Mapping[str, Any]) -> Posterior:
-    """Return what `Posterior.as_json` gave; what was not finite there is NaN."""
+    """Return what `Posterior.as_json` gave; what was not finite, or not stored by an earlier version, is NaN."""
 
     def array(name: str) -> Float:
-        return np.array(content[name], dtype=np.float64)
+        return np.array(content.get(name, np.nan), dtype=np.float64)
 
     return Posterior(
         tuple(content["names"]),
-        *(array("point"), array("covariance"), array("stated")),
+        *(array("point"), array("covariance"), array("logged_point"), array("logged_covariance"), array("stated")),
         content["kind"],
         Agreement(float(content["statistic"]), int(content["degrees_of_freedom"])),
         float(content["log_likelihood"]),
@@ -80,6 +95,7 @@ def from_json(content: Mapping[str, Any]) -> Posterior:
 
 
 def posterior_of(
+    logged: PooledFit,
     fit: PooledFit,
     uncertainty: PooledUncertainty,
     agreement: Agreement,
@@ -90,6 +106,10 @@ def posterior_of(
 
     Parameters
     ----------
+    logged : PooledFit
+        With the instants of measurement as they are logged.
+    fit : PooledFit
+        With unsure instants free.
     uncertainty : PooledUncertainty
         Its errors, not widened by what the runs disagree about, with those of instants.
     agreement : Agreement
@@ -99,8 +119,11 @@ def posterior_of(
     late : ndarray, shape (q, q), optional
         What is not known of instants adds to the covariance: beside unsure instants the runs say that much less.
     """
-    names = (*HULL_PARAMETERS, *fit.model.names)
-    point = np.concatenate([fit.hull, fit.values])
     return Posterior(
-        names, point, fit.covariance + late, uncertainty.covariance, uncertainty.kind, agreement, log_likelihood
+        (*HULL_PARAMETERS, *fit.model.names),
+        *(fit.parameters, fit.covariance + late),
+        *(logged.parameters, logged.covariance),
+        *(uncertainty.covariance, uncertainty.kind),
+        agreement,
+        log_likelihood,
     )

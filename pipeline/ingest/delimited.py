@@ -18,6 +18,7 @@ from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
 from kempf.pipeline.ingest.text.cells import DECIMAL_COMMA, number
 from kempf.pipeline.ingest.text.row_times import row_times
+from kempf.schemas.channels import ROW
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source
 
@@ -110,7 +111,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         layout.rows,
         time,
         sources,
-        ("row",),
+        (ROW,),
         reason,
         channels,
         timed.notes,

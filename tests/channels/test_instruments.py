@@ -111,6 +111,59 @@ def test_a_much_faster_vtg_comes_before_rmc() -> None:
     assert found.sources["course_over_ground"] == "GPVTG"
 
 
+def rows(row_s: float, held_rows: int = 1) -> pl.DataFrame:
+    """A table of 400 rows in which a heading is fresh in every row, and a yaw rate held for some."""
+    t = row_s * np.arange(400.0)
+    random = np.random.default_rng(7)
+    yaw_rate = 0.01 * np.sin(0.02 * np.arange(400 // held_rows + 1)) + 1e-5 * random.standard_normal(
+        400 // held_rows + 1
+    )
+    heading = 1.0 + 0.2 * np.sin(0.05 * t) + 1e-5 * random.standard_normal(t.size)
+    values = {"heading_rad": heading, "yaw_rate_rad_s": np.repeat(yaw_rate, held_rows)[: t.size]}
+    return frame(("row", t, values))
+
+
+def test_who_repeats_one_instrument_samples_the_others_too() -> None:
+    found = from_readings(rows(0.2, held_rows=5))
+    heading = found.series["heading"]
+    assert len(heading) == 400 and len(found.series["yaw_rate"]) == 80
+    # anywhere in the row before
+    assert heading.time_utc_ns[0] == START - 100_000_000 and heading.period_s == pytest.approx(0.2)
+    assert found.instant_std_s["heading"] == pytest.approx(0.2 / 12.0**0.5)
+    assert any(note.startswith("heading: in rows of 0.2 s, that repeat other instruments: ") for note in found.notes)
+    assert 0.0 < found.instant_std_s["yaw_rate"] <= 0.2 / 12.0**0.5 * 1.001
+
+
+def test_rows_as_slow_as_instruments_do_not_show_that_they_repeat_any() -> None:
+    found = from_readings(rows(1.0))
+    assert found.series["heading"].time_utc_ns[0] == found.series["yaw_rate"].time_utc_ns[0] == START - SECOND // 2
+    assert found.instant_std_s == pytest.approx(dict.fromkeys(("heading", "yaw_rate"), 12.0**-0.5))
+    assert any(note.startswith("heading and yaw_rate: in rows of 1 s, as slow as instru") for note in found.notes)
+
+
+def test_fast_rows_that_repeat_nothing_are_the_instants_of_measurement() -> None:
+    found = from_readings(rows(0.2))
+    assert found.series["heading"].time_utc_ns[0] == START and not found.instant_std_s
+
+
+def test_a_column_that_is_seldom_filled_makes_no_slow_rows_of_fast_ones() -> None:
+    table = rows(0.2).with_columns(
+        pl.when(pl.col("record") % 10 == 0).then(pl.col("yaw_rate_rad_s")).alias("yaw_rate_rad_s")
+    )
+    found = from_readings(table)
+    assert found.series["yaw_rate"].period_s == pytest.approx(2.0) and not found.instant_std_s
+
+
+def test_a_table_of_one_row_has_no_rows_apart() -> None:
+    found = from_readings(rows(1.0).head(1))
+    assert found.series["heading"].time_utc_ns.tolist() == [START] and not found.instant_std_s
+
+
+def test_messages_have_instants_of_their_own_however_slow_they_are() -> None:
+    found = from_readings(rows(1.0).with_columns(source=pl.lit("HEHDT")))
+    assert found.series["heading"].time_utc_ns[0] == START and not found.instant_std_s
+
+
 def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
     rows = frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast)), ("HEHDT", fast, {"heading_rad": 0.1 * fast}))

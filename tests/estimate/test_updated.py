@@ -19,7 +19,7 @@ from tests.estimate.test_plain_fit import SPEC, fitted, run, with_rudder
 
 def left_by(*runs: GridRun) -> Posterior:
     fit = fitted(*runs).fit
-    return posterior_of(fit, uncertainty_of(fit), agreement_of(fit), fit.log_likelihood)
+    return posterior_of(fit, fit, uncertainty_of(fit), agreement_of(fit), fit.log_likelihood)
 
 
 def brought(before: Posterior, *runs: GridRun, workers: int = 2) -> Updated | None:
@@ -36,7 +36,7 @@ def test_a_further_run_gives_what_all_of_them_give_at_once(before: Posterior) ->
     made = brought(before, run(25))
     assert made is not None and made.fit.converged
     at_once = left_by(*(run(seed) for seed in (21, 22, 23, 24, 25)))
-    after = posterior_of(made.fit, made.known, made.agreement, made.log_likelihood)
+    after = posterior_of(made.logged, made.fit, made.known, made.agreement, made.log_likelihood)
     std = np.sqrt(np.diag(at_once.stated))
     assert np.max(np.abs(after.point - at_once.point) / std) < 0.1
     np.testing.assert_allclose(np.sqrt(np.diag(after.stated)) / std, 1.0, atol=0.05)
@@ -74,20 +74,27 @@ def test_what_is_not_known_of_instants_counts_against_what_the_runs_before_say(b
     assert np.all((wider > 1.5) & (wider < 4.0))
 
 
-def test_a_new_run_is_judged_where_it_is_stated(before: Posterior) -> None:
-    with ThreadPoolExecutor(2) as executor:
-        found = [
-            updated(
-                before,
-                EffectModel(),
-                [run(25)],
-                SPEC,
-                executor,
-                stated=lambda fit, k=k: replace(fit, hull=k * fit.hull),  # type: ignore[misc]
-            )
-            for k in (1.0, 1.5)
-        ]
-    assert found[0] is not None and found[1] is None
+def test_a_hull_that_moved_with_the_instants_of_the_runs_before_is_no_disagreement(before: Posterior) -> None:
+    plain = brought(before, run(25))
+    std = np.sqrt(np.diag(before.covariance))
+    # hundreds of runs know their hull to less than it moves with their instants
+    moved = replace(before, point=before.point + 8.0 * std, covariance=1.5 * before.covariance)
+    made = brought(moved, run(25))
+    assert plain is not None and made is not None
+    # the run is fitted, and judged, beside what the others say of their instants as logged
+    np.testing.assert_array_equal(made.logged.hull, plain.logged.hull)
+    assert made.agreement == plain.agreement and made.log_likelihood == plain.log_likelihood
+    # four runs of five stand for where theirs is with instants free
+    np.testing.assert_array_equal(made.fit.hull, made.logged.hull)
+    assert moved.freed.loss(made.fit.hull + made.step) < 0.1 * moved.freed.loss(plain.fit.hull)
+    assert np.all(np.diag(made.fit.covariance) > np.diag(plain.fit.covariance))
+
+
+def test_nothing_moves_where_all_instants_are_as_logged(before: Posterior) -> None:
+    made = brought(before, run(25))
+    assert made is not None
+    assert np.max(np.abs(made.step) / made.logged.std) < 1e-6
+    np.testing.assert_allclose(made.fit.covariance, made.logged.covariance, rtol=1e-6)
 
 
 def test_a_run_of_another_ship_is_not_brought_in(before: Posterior) -> None:
@@ -110,3 +117,10 @@ def test_a_parameter_at_a_bound_leaves_nothing_to_build_on(before: Posterior) ->
     covariance[2] = covariance[:, 2] = np.nan
     at_bound = replace(before, covariance=covariance)
     assert before.usable and not at_bound.usable and not from_json(at_bound.as_json()).usable
+    assert brought(at_bound, run(25)) is None
+
+
+def test_what_an_earlier_version_left_is_nothing_to_build_on(before: Posterior) -> None:
+    stored = before.as_json()
+    del stored["logged_point"], stored["logged_covariance"]
+    assert not from_json(stored).usable

@@ -172,7 +172,7 @@ def test_a_model_with_effects_is_brought_forward_with_its_parents(own: Warehouse
         patch.setattr(
             errors_of_fit,
             "with_instants",
-            lambda fit, _: WithInstants(fit, fit.covariance * (len(fit.runs) > 1)),
+            lambda fit, *_: WithInstants(fit, fit.covariance * (len(fit.runs) > 1)),
         )
         made, new = store_model(own, choose(own, "ferry"), spec, NONE_OF_ONES_OWN)
         assert new

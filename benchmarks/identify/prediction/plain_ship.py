@@ -99,21 +99,21 @@ def compared(number: int, *, stamped: bool) -> ComparedShip:
     """
     hull, _ = drawn(number)
     with tempfile.TemporaryDirectory() as folder:
-        warehouse = taken_in(hull, number, Path(folder), stamped=stamped)
+        warehouse = taken_in(hull, number, Path(folder), None if stamped else 10.0)
         pool_vessel(warehouse, hull.name, Request(), identify_vessel(warehouse, hull.name))
         figures, refused, models = predicted_beside(warehouse, hull.name, hull.trial_speed_m_s, _truth(hull))
     return ComparedShip("stamped" if stamped else "plain", hull.name, "", figures, refused, models=models)
 
 
-def taken_in(hull: SimulatedHull, number: int, folder: Path, *, stamped: bool) -> Warehouse:
+def taken_in(hull: SimulatedHull, number: int, folder: Path, rows_hz: float | None = None) -> Warehouse:
     """Sail her zigzags in wind and stream and take their log in.
 
     Parameters
     ----------
     folder : Path
         Of the log and of the warehouse.
-    stamped : bool
-        Whether every reading of the log has its own instant.
+    rows_hz : float, optional
+        Rows of the log, a second; without them every reading has its own instant.
     """
     own_s = hull.length_m / hull.trial_speed_m_s
     steps = (
@@ -125,8 +125,8 @@ def taken_in(hull: SimulatedHull, number: int, folder: Path, *, stamped: bool) -
     settings = TrialSettings(
         hull, steps, PAPER_ENVIRONMENT, _instruments(number), seed=number, heading_deg=20.0 * number
     )
-    log, trial = folder / ("trial.mcap" if stamped else "trial.csv"), simulate_trial(settings)
-    log.write_bytes(to_mcap(trial) if stamped else to_csv(trial))
+    log, trial = folder / ("trial.csv" if rows_hz else "trial.mcap"), simulate_trial(settings)
+    log.write_bytes(to_csv(trial, rows_hz) if rows_hz else to_mcap(trial))
     warehouse = Warehouse(str(folder / "warehouse"))
     ingest(warehouse, [log], hull.name, logger_profile(settings))
     return warehouse

@@ -38,17 +38,19 @@ class FitErrors:
         return replace(both, covariance=both.covariance * agreement.widened**2)
 
 
-def errors_of(fit: PooledFit, known: PooledUncertainty) -> FitErrors:
+def errors_of(fit: PooledFit, known: PooledUncertainty, step: Float | float = 0.0) -> FitErrors:
     """Return a fit and its errors, instants free; those of a model with effects are the ones that its diagnosis states.
 
     Parameters
     ----------
     known : PooledUncertainty
         Of all runs, without what is not known of the instants of those that are fitted here.
+    step : ndarray, shape (6 + p,), optional
+        To the maximum, see `pipeline.diagnose.screening.unsure_instants.with_instants`.
     """
     of_effects = bool(fit.ship.model.effects)
     if of_effects:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        instants = with_instants(fit, workers)
+        instants = with_instants(fit, workers, step)
     return FitErrors(instants.fit, known, instants.covariance, of_effects)

@@ -25,7 +25,6 @@ from kempf.flows.jobs.state.out_of_date import command_for
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.diagnose.steps.ladder_step import rung, step_of
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -256,16 +255,16 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
     model = _model(before, Own.from_json(settings.get("own") or {}))
     search = settings_of(settings.get(SEARCH) or {})
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        update = updated(
-            left, model, runs.runs, runs.spec, workers, search, stated=lambda fit: with_instants(fit, workers).fit
-        )
+        update = updated(left, model, runs.runs, runs.spec, workers, search)
     if update is None:
         return None
-    errors = errors_of(update.fit, update.known)
+    errors = errors_of(update.fit, update.known, update.step)
     gross_errors = sum(sum(single.gross_errors.values()) for single in update.alone)
     result = as_set(errors.fit, errors.widened(update.agreement), runs, gross_errors, request)
     then = before.convergence
-    behind = posterior_of(errors.fit, errors.together, update.agreement, update.log_likelihood, errors.late)
+    behind = posterior_of(
+        update.logged, errors.fit, errors.together, update.agreement, update.log_likelihood, errors.late
+    )
     skipped = {name: why for name, why in {**runs.skipped, **update.left_out}.items() if name in request.segment_ids}
     number = len(then["levels"])
     return replace(

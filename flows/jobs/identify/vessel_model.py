@@ -254,7 +254,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     step = step_of(errors.fit, [runs.runs[i] for i in left], fitted.ahead[number])
     agreement = agreement_of(fit) if effects else plain.agreement
     result = as_set(errors.fit, errors.widened(agreement), runs, plain.gross_errors, request)
-    left_behind = posterior_of(errors.fit, errors.together, agreement, fit.log_likelihood, errors.late)
+    left_behind = posterior_of(fit, errors.fit, errors.together, agreement, fit.log_likelihood, errors.late)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}

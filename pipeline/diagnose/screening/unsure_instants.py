@@ -67,21 +67,23 @@ class WithInstants:
         return std
 
 
-def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
+def with_instants(fit: PooledFit, workers: Executor, step: Float | float = 0.0) -> WithInstants:
     """Return a fit with the instants of its instruments free, as far as they are not known.
 
     Parameters
     ----------
     fit : PooledFit
-        At its maximum.
+        At its maximum, or a step from it.
     workers : Executor
         Share the passes; nothing depends on it.
+    step : ndarray, shape (6 + p,), optional
+        To the maximum: with all instants as logged it is 0, beside others whose instants are free it is not.
     """
-    covariance = np.nan_to_num(fit.covariance)
+    covariance, step = np.nan_to_num(fit.covariance), np.zeros(fit.covariance.shape[0]) + step
     rows = _rows(fit, workers)
     late = [*rows, *_smoothed(fit, workers)]
     if not late:
-        return WithInstants(fit, np.zeros_like(covariance))
+        return WithInstants(_moved(fit, step), np.zeros_like(covariance))
     std_s = np.array([one.std_s[log] for one in rows for log in one.logs])
     foreign = np.array([one.foreign for one in rows for _ in one.logs])
     places, parts = [], 0
@@ -108,15 +110,23 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
         score[free] += foreign[free] * (column[:, : free.size].T @ line.u)
     # what every column does beside the hull, and each to the hull
     beside, to_hull = own - across[:, :m].T @ covariance @ across, covariance @ across
+    score -= foreign * (across[:, :m].T @ step)
     late_covariance = inverse(beside[:, :m] + np.diag(std_s**-2.0))
     late_s = np.clip(late_covariance @ score, -_MOST * std_s, _MOST * std_s)
     # at the maximum the scores of what is shared are zero
-    moved = np.concatenate([fit.hull, fit.values]) - to_hull[:, :m] @ late_s
-    hull, values = np.split(moved, [len(HULL_PARAMETERS)])
+    moved = _moved(fit, step - to_hull[:, :m] @ late_s)
     # the instants of rows follow a lateness that is only considered
     considered = to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]
     added: Float = to_hull[:, :m] @ late_covariance @ to_hull[:, :m].T + considered @ considered.T
-    return WithInstants(replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high)), added)
+    return WithInstants(moved, added)
+
+
+def _moved(fit: PooledFit, step: Float) -> PooledFit:
+    """Return a fit a step farther, within the bounds of its effects; the very same without a step."""
+    if not np.any(step):
+        return fit
+    hull, values = np.split(fit.parameters + step, [len(HULL_PARAMETERS)])
+    return replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high))
 
 
 def _unbound(fit: PooledFit, number: int, score: Float) -> Mask:
