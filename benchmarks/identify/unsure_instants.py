@@ -142,7 +142,7 @@ def page(
         "",
     ]
     columns = (
-        *("ship", "runs", "of these unsure", "instants known to, s: velocity, heading, yaw rate, rudder"),
+        *("ship", "runs", "of these unsure", "instants known to, s: velocity, heading, yaw rate, rudder, smoothing"),
         *("hull moved by at most, s.e.", "errors wider by at most", "free run, best: before, after", "worst"),
     )
     return [

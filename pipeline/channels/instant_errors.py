@@ -19,8 +19,9 @@ _OTHERS = ("heading", "yaw_rate", "rudder_angle")
 class InstantErrors:
     """Standard errors of the instants at which the instruments of a log measured, s; 0 where they are in the log.
 
-    A value that rows repeat was measured somewhere within the row before it first shows (decision 0073), and a velocity
-    that is smoothed comes late (decision 0045). Both are off by as much in all manoeuvres of a log.
+    A value in rows that sample their instruments was measured somewhere within the row before it first shows (decisions
+    0073 and 0109), and a velocity that is smoothed comes late (decision 0045). Both are off by as much in all
+    manoeuvres of a log.
     """
 
     velocity_s: float = 0.0
@@ -68,6 +69,6 @@ def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:
         if instant_std_s.get(name, 0.0) > 0.0:
             by_size.setdefault(f"{instant_std_s[name]:.1g}", []).append(name.replace("_", " "))
     return tuple(
-        f"the log repeats values in its rows: the instants of {listed(names)} are known to {size} s (1 s.e.)"
+        f"the rows of the log have instants of their own: those of {listed(names)} are known to {size} s (1 s.e.)"
         for size, names in by_size.items()
     )

@@ -40,8 +40,9 @@ _OWN_CLOCK, _MAGNETIC = ("RMC", "GGA", "GLL"), ("HDG", "HDM")
 _REPEATS = ("II", "IN")
 #: share of the most frequent source's readings from which a better one is taken, and from which one is as frequent
 _ENOUGH, _AS_MANY = 0.25, 0.9
-#: rows so far apart, s, are as slow as receivers measure, give or take: in them nothing would show that it repeats
-_SLOW_S = 0.9
+#: table rows so far apart, s, do not show that they repeat a receiver of one fix a second; share of the rows of a table
+#: that an instrument fills whose values are sampled, and not written as they come
+_SLOW_S, _FILLED = 0.65, 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +89,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     sources: dict[str, str] = {}
     notes: list[str] = []
     unsure: dict[str, float] = {}
-    rows: dict[str, _Rows] = {}
+    table = _Table.of(frame)
     for group in groups:
         offered = counts.filter(pl.col(_name(group)) > 0)
         if offered.is_empty():
@@ -97,26 +98,24 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
             continue
         source, others = _choose(dict(offered.select("source", _name(group)).iter_rows()))
         own_notes: list[str] = []
-        channels, held, apart_s = _at_instants(group, *_of_one(frame, source, group), source, own_notes)
+        channels, held = _at_instants(group, *_of_one(frame, source, group), source, own_notes)
         if others:
             also = (_also(frame, other, group, channels) for other in others)
             notes.append(f"{' and '.join(group)} from {source}; also in {', '.join(also)}, not used")
         notes += own_notes
         series |= channels
         sources |= dict.fromkeys(channels, source)
-        own_rows = rows.setdefault(source, _Rows(table=source == ROW))
-        own_rows.apart_s = min(own_rows.apart_s, apart_s)
         if held.rows_per_value > 1:
-            own_rows.repeat = True
+            table.repeats = table.repeats or source == ROW
             unsure |= dict.fromkeys(channels, held.std_s)
-        else:
-            own_rows.fresh += channels
+        elif source == ROW and held.time_utc_ns.size >= _FILLED * table.rows:
+            table.fresh += channels
     gaps, leaping = named_gaps(series), list[str]()
     left_out = _leave_out_leaps(series, leaping)
-    for source, own_rows in rows.items():
-        if own_rows.sampled and own_rows.fresh:
-            _put_in_the_middle(source, own_rows, series, notes)
-            unsure |= dict.fromkeys(own_rows.fresh, own_rows.apart_s * WITHIN)
+    if table.sampled and table.fresh:
+        # behind the leaps, which are named by their rows
+        _put_in_the_middle(table, series, notes)
+        unsure |= dict.fromkeys(table.fresh, table.apart_s * WITHIN)
     notes = [*gaps, *leaping, *notes]
     own = set(series)
     _add_speed_and_course(series, sources, notes)
@@ -125,32 +124,39 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
 
 
 @dataclass
-class _Rows:
-    """The rows of one source, by what its instruments show of them."""
+class _Table:
+    """The rows of a table, with what its instruments show of them; a log of messages has none."""
 
-    #: Whether they are those of a table, and not messages that an instrument sends.
-    table: bool
-    #: How far they are apart, s.
-    apart_s: float = inf
+    #: How many there are, and how far apart they are, s.
+    rows: int
+    apart_s: float
     #: Whether they repeat the last value of an instrument.
-    repeat: bool = False
-    #: Channels that are new in every row.
+    repeats: bool = False
+    #: Channels that fill them and are not repeated.
     fresh: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, frame: pl.LazyFrame) -> _Table:
+        """Count the rows; where several share a coarse time, they are so much closer."""
+        time = frame.filter(pl.col("source") == ROW).select("time_utc_ns").drop_nulls().collect()["time_utc_ns"]
+        own = time.unique().sort()
+        apart_s = float(np.median(np.diff(own.to_numpy()))) / SECOND_NS if own.len() > 1 else inf
+        return cls(time.len(), apart_s * own.len() / max(time.len(), 1))
 
     @property
     def sampled(self) -> bool:
-        """Whether they have instants of their own, and not those of their instruments (decision 0109)."""
-        return self.repeat or (self.table and _SLOW_S <= self.apart_s < inf)
+        """Whether rows have instants of their own, and not those of their instruments (decision 0109)."""
+        return self.repeats or _SLOW_S <= self.apart_s < inf
 
 
-def _put_in_the_middle(source: str, rows: _Rows, series: dict[str, Series], notes: list[str]) -> None:
+def _put_in_the_middle(table: _Table, series: dict[str, Series], notes: list[str]) -> None:
     """Take what was measured at some time since the row before at the middle of that time."""
-    for name in rows.fresh:
-        series[name] = Series(series[name].time_utc_ns - round(0.5 * rows.apart_s * SECOND_NS), series[name].value)
-    why = "that repeat other instruments" if rows.repeat else "as slow as instruments measure"
+    for name in table.fresh:
+        series[name] = Series(series[name].time_utc_ns - round(0.5 * table.apart_s * SECOND_NS), series[name].value)
+    why = "that repeat other instruments" if table.repeats else "as slow as instruments measure"
     notes.append(
-        f"{listed(rows.fresh)}: in rows of {rows.apart_s:.2g} s{'' if rows.table else f' of {source}'}, {why}: "
-        "measured at some time since the row before, of which the middle is taken"
+        f"{listed(table.fresh)}: in rows of {table.apart_s:.2g} s, {why}: measured at some time since the row before, "
+        "of which the middle is taken"
     )
 
 
@@ -202,7 +208,7 @@ def _also(frame: pl.LazyFrame, source: str, group: tuple[str, ...], chosen: dict
     # two antennas are two places
     if "latitude" in group:
         return source
-    channels, _, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
+    channels, _ = _at_instants(group, *_of_one(frame, source, group), source, [])
     found = {name: difference(name, chosen[name], channels[name]) for name in group}
     if len(set(found.values())) == 1:
         differ = next(iter(found.values()))
@@ -237,8 +243,8 @@ def _remoteness(source: str) -> tuple[bool, bool, bool]:
 
 def _at_instants(
     group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
-) -> tuple[dict[str, Series], Held, float]:
-    """Return the series of a group, in which rows its instrument measured, and how far these are apart, s."""
+) -> tuple[dict[str, Series], Held]:
+    """Return the series of a group, and in which rows its instrument measured."""
     # most logs are in order, and a long one is not copied for nothing
     if np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
@@ -259,7 +265,7 @@ def _at_instants(
         if CHANNELS[name].wrap == "circle":
             value = np.unwrap(value)
         result[name] = Series(held.time_utc_ns, value)
-    return result, held, Series(time, values[:, 0]).period_s
+    return result, held
 
 
 def _add_from_the_bow(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:

@@ -44,7 +44,7 @@ class Posterior:
     kind: str
     #: How well the runs agree on the ship.
     agreement: Agreement
-    #: Of all runs at the point.
+    #: Of all runs, with the instants as they are logged, at the point of these.
     log_likelihood: float
 
     @property

@@ -159,9 +159,37 @@ def test_a_table_of_one_row_has_no_rows_apart() -> None:
     assert found.series["heading"].time_utc_ns.tolist() == [START] and not found.instant_std_s
 
 
-def test_messages_have_instants_of_their_own_however_slow_they_are() -> None:
-    found = from_readings(rows(1.0).with_columns(source=pl.lit("HEHDT")))
-    assert found.series["heading"].time_utc_ns[0] == START and not found.instant_std_s
+def test_rows_that_hold_one_reading_each_have_its_instant() -> None:
+    """Readings of 1 Hz that are written as they come are no rows of 1 s."""
+    table = pl.concat(
+        [
+            rows(1.0)
+            .select(*READING_SCHEMA)
+            .with_columns(
+                pl.col("time_utc_ns") + round(late_s * SECOND),
+                *(
+                    pl.lit(None, dtype=pl.Float64).alias(other)
+                    for other in ("heading_rad", "yaw_rate_rad_s")
+                    if other != own
+                ),
+            )
+            for own, late_s in (("heading_rad", 0.13), ("yaw_rate_rad_s", 0.57))
+        ]
+    ).sort("time_utc_ns")
+    found = from_readings(table)
+    assert found.series["heading"].time_utc_ns[0] == START + round(0.13 * SECOND)
+    assert found.series["yaw_rate"].period_s == 1.0 and not found.instant_std_s
+
+
+def test_rows_that_share_a_coarse_time_are_not_as_slow_as_that() -> None:
+    table = rows(0.2).with_columns(pl.col("time_utc_ns") // SECOND * SECOND)
+    assert not from_readings(table).instant_std_s
+
+
+@pytest.mark.parametrize("held_rows", [1, 5])
+def test_messages_have_instants_of_their_own_however_slow_they_are(held_rows: int) -> None:
+    found = from_readings(rows(1.0, held_rows).with_columns(source=pl.lit("HEHDT")))
+    assert found.series["heading"].time_utc_ns[0] == START and "heading" not in found.instant_std_s
 
 
 def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:

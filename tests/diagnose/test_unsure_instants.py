@@ -12,11 +12,15 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening import unsure_instants
 from kempf.pipeline.diagnose.screening.nuisance import columns_of
 from kempf.pipeline.diagnose.screening.unsure_instants import with_instants, within_rows
+from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
+from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.estimate.updated import updated
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
@@ -48,6 +52,28 @@ def test_a_hull_is_as_if_the_instants_were_right() -> None:
     assert np.max(after) < 0.35 * np.max(before)
     # and what is left lies in what is stated for it
     assert np.all(np.abs(found.fit.hull - right.hull) < 2.0 * np.sqrt(np.diag(found.covariance)) + 0.1 * right.std[:6])
+
+
+def test_a_further_run_is_brought_in_as_all_at_once_would_have_it() -> None:
+    ship = sailed()
+    right = fit_plain(ship.runs[:3], ship.spec, WORKERS).fit
+    own = LATE["heading_latency"]
+    runs = [
+        replace(late(ship, right, "heading_latency", run), day=day, instant_errors=own)
+        for day, run in enumerate(ship.runs[:4])
+    ]
+    first, whole = (fit_plain(some, ship.spec, WORKERS).fit for some in (runs[:3], runs))
+    freed, at_once = (with_instants(fit, WORKERS) for fit in (first, whole))
+    known = uncertainty_of(first)
+    before = posterior_of(first, freed.fit, known, agreement_of(first), first.log_likelihood, freed.covariance)
+    made = updated(before, EffectModel(), runs[3:], ship.spec, WORKERS)
+    assert made is not None
+    found, without = with_instants(made.fit, WORKERS, made.step), with_instants(made.fit, WORKERS)
+    std = np.sqrt(np.diag(whole.covariance + at_once.covariance))
+    off, off_without = (np.max(np.abs(one.fit.hull - at_once.fit.hull) / std) for one in (found, without))
+    assert off < 0.25 and off_without > 4.0 * off
+    stated = np.diag(made.fit.covariance + found.covariance) / np.diag(whole.covariance + at_once.covariance)
+    np.testing.assert_allclose(stated, 1.0, atol=0.15)
 
 
 def test_a_lateness_of_smoothing_is_considered_and_moves_nothing() -> None:

@@ -229,8 +229,9 @@ def build_updated(instruments: Mapping[str, Instruments], request: SetRequest) -
     if addition is None:
         raise DataRejected(
             "not_brought_forward",
-            f"With this code {before.parameter_set_id} cannot be brought forward by {len(bounds)} manoeuvres: its "
-            "model is to be fitted to all of them at once.",
+            f"With this code {before.parameter_set_id} cannot be brought forward by {len(bounds)} manoeuvres: they lie "
+            "too far from it, or an earlier version stored it without what is needed. Its model is to be fitted to all "
+            "of them at once.",
             f"Make it so with `{command_for([request.vessel])}`.",
         )
     return addition

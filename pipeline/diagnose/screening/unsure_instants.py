@@ -1,9 +1,10 @@
 """A fit whose instruments measured at instants that are not quite known: what it would be with them free.
 
-The instants of values that a log repeats (`kempf.pipeline.channels.holds`) are known to some hundredths of a second. A
-fit believes them, and its hull is off by what they are off, in every manoeuvre of the log to one side. Here they are
-parameters of each log, with what is known of them as a normal distribution, and are found together with hull and
-effects by one step of Gauss and Newton: hundredths of a second move a hull so little that it is linear in them.
+The instants of values in rows that sample their instruments (`kempf.pipeline.channels.instruments`) are known to a part
+of a row: some hundredths of a second, up to half a second. A fit believes them, and its hull is off by what they are
+off, in every manoeuvre of the log to one side. Here they are parameters of each log, with what is known of them as a
+normal distribution, and are found together with hull and effects by one step of Gauss and Newton: what that leaves is
+shown by `benchmarks.identify.unsure_instants`.
 
 The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.undelayed_speeds`) is known no better, and is
 not found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and
