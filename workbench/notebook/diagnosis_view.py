@@ -48,7 +48,7 @@ class DiagnosisView:
 
     @property
     def verdict(self) -> str:
-        """``adequate``, ``explained``, ``ambiguous``, ``unexplained`` or ``insufficient_data``."""
+        """``adequate``, ``explained``, ``partly_explained``, ``ambiguous``, ``unexplained``, ``insufficient_data``."""
         return self.diagnosis.verdict
 
     @property
