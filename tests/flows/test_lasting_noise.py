@@ -71,7 +71,7 @@ def test_a_set_holds_what_is_not_known_of_a_lateness_also_where_no_noise_lasts(
         assert all(any("late beside the fixes" in said for said in one.warnings) for one in sets)
         assert [lasting(one) for one in sets] == [set()] * 4
         stds.append([next(p.std for p in one.parameters if p.name == "a21") for one in sets])
-        monkeypatch.setattr(errors_of_fit, "with_instants", lambda fit, _: WithInstants(fit, 0.0 * fit.covariance))
+        monkeypatch.setattr(errors_of_fit, "with_instants", lambda fit, *_: WithInstants(fit, 0.0 * fit.covariance))
     # sway, and by drift the yaw
     assert np.all(np.array(stds[0]) > 1.02 * np.array(stds[1])), stds
 
