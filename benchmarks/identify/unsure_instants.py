@@ -114,15 +114,15 @@ def page(
     """Return the lines of the page."""
     inside, rms = [], []
     for rate_hz, of_rate in ships.items():
-        for free in (False, True):
-            found = [
-                (one.free, one.free_std, true) if free else (one.fixed, one.fixed_std, true) for one, true in of_rate
-            ]
-            name = [f"{rate_hz:g}", "free" if free else "as they are taken"]
-            off = np.array([np.abs(hull - true) < NORMAL_95 * std for hull, std, true in found])
-            inside.append([*name, *(f"{100.0 * np.mean(part):.0f} %" for part in (*off.T, off))])
-            error = np.sqrt(np.mean([(hull / true - 1.0) ** 2 for hull, _, true in found], axis=0))
-            rms.append([*name, *(f"{100.0 * x:.2f} %" for x in error)])
+        true = np.array([hull for _, hull in of_rate])
+        for words, found in (
+            ("as they are taken", [(one.fixed, one.fixed_std) for one, _ in of_rate]),
+            ("free", [(one.free, one.free_std) for one, _ in of_rate]),
+        ):
+            hull, std = np.array(found).swapaxes(0, 1)
+            within, error = np.abs(hull - true) < NORMAL_95 * std, np.sqrt(np.mean((hull / true - 1.0) ** 2, axis=0))
+            inside.append([f"{rate_hz:g}", words, *(f"{100.0 * np.mean(part):.0f} %" for part in (*within.T, within))])
+            rms.append([f"{rate_hz:g}", words, *(f"{100.0 * x:.2f} %" for x in error)])
     head = ["rows a second", "instants", *HULL_PARAMETERS, "all"]
     lines = [
         f"## {len(next(iter(ships.values())))} simulated ships",

@@ -115,9 +115,8 @@ def rows(row_s: float, held_rows: int = 1) -> pl.DataFrame:
     """A table of 400 rows in which a heading is fresh in every row, and a yaw rate held for some."""
     t = row_s * np.arange(400.0)
     random = np.random.default_rng(7)
-    yaw_rate = 0.01 * np.sin(0.02 * np.arange(400 // held_rows + 1)) + 1e-5 * random.standard_normal(
-        400 // held_rows + 1
-    )
+    measured = np.arange(400 // held_rows + 1)
+    yaw_rate = 0.01 * np.sin(0.02 * measured) + 1e-5 * random.standard_normal(measured.size)
     heading = 1.0 + 0.2 * np.sin(0.05 * t) + 1e-5 * random.standard_normal(t.size)
     values = {"heading_rad": heading, "yaw_rate_rad_s": np.repeat(yaw_rate, held_rows)[: t.size]}
     return frame(("row", t, values))

@@ -84,7 +84,7 @@ def test_a_hull_that_moved_with_the_instants_of_the_runs_before_is_no_disagreeme
     # the run is fitted, and judged, beside what the others say of their instants as logged
     np.testing.assert_array_equal(made.logged.hull, plain.logged.hull)
     assert made.agreement == plain.agreement and made.log_likelihood == plain.log_likelihood
-    # four runs of five stand for where theirs is with instants free
+    # the others count for four runs of five, with the hull that is theirs with instants free
     np.testing.assert_array_equal(made.fit.hull, made.logged.hull)
     assert moved.freed.loss(made.fit.hull + made.step) < 0.1 * moved.freed.loss(plain.fit.hull)
     assert np.all(np.diag(made.fit.covariance) > np.diag(plain.fit.covariance))
