@@ -21,7 +21,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     return [f"| {' | '.join(line)} |" for line in (head, ["---"] * len(head), *rows)]
 
 
-def write(name: str, title: str, lines: Sequence[str], *, options: str = "") -> Path:
+def write(name: str, title: str, lines: Sequence[str], *, options: str = "", page: str = "") -> Path:
     """Write the page of a benchmark, ``results/NAME.md`` without its room, and return its path.
 
     Parameters
@@ -32,11 +32,13 @@ def write(name: str, title: str, lines: Sequence[str], *, options: str = "") -> 
         Markdown after the line that names command and versions.
     options : str, optional
         Options of the command that change the result.
+    page : str, optional
+        Another name of the page, where a command writes several.
     """
     RESULTS.mkdir(exist_ok=True)
     command = f"python -m benchmarks.{name} {options}".strip()
     versions = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
     head = [f"# {title}", "", f"`{command}`; Python {platform.python_version()}, {versions}.", ""]
-    path = RESULTS / f"{name.rpartition('.')[2]}.md"
+    path = RESULTS / f"{page or name.rpartition('.')[2]}.md"
     path.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
     return path

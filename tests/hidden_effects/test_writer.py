@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections import Counter
+from datetime import datetime
 from io import BytesIO
 from pathlib import Path
 
@@ -120,3 +121,14 @@ def test_a_changed_seal_is_refused():
     for wrong, key in ((data[:-1] + b"\0", b"key"), (data, b"other")):
         with pytest.raises(DataRejected, match="do not fit"):
             open_sealed(wrong, key)
+
+
+def test_all_logs_may_be_tables_of_slow_rows():
+    case = design(6, 1, rows_hz=2.0)[0]
+    assert [c.hull for c in design(6, 1, rows_hz=2.0)] == [c.hull for c in design(6, 1)]
+    tables = {name: content for name, content in write.logs_of(case)[0].items() if name != "profile.yaml"}
+    assert len(tables) == 2 and all(name.endswith(".csv.gz") for name in tables)
+    for content in tables.values():
+        stamps = [line.split(b",")[0] for line in gzip.decompress(content).splitlines()[1:4]]
+        first, second, third = (datetime.fromisoformat(stamp.decode()) for stamp in stamps)
+        assert (second - first).total_seconds() == (third - second).total_seconds() == 0.5

@@ -48,6 +48,8 @@ class Case:
     formats: tuple[str, str]
     #: Of everything random in the case.
     seed: int
+    #: Rows a second of the delimited logs; None for as many as every reading needs to stand in two of them.
+    rows_hz: float | None = None
 
     @property
     def hidden(self) -> HiddenEffect | None:
@@ -55,7 +57,7 @@ class Case:
         return (CATALOGUE | OUTSIDERS).get(self.effect)
 
 
-def design(n: int, seed: int) -> tuple[Case, ...]:
+def design(n: int, seed: int, rows_hz: float | None = None) -> tuple[Case, ...]:
     """Return the cases in an order that gives nothing away.
 
     Parameters
@@ -63,6 +65,8 @@ def design(n: int, seed: int) -> tuple[Case, ...]:
     n : int
         How many; an eighth has no effect, about a sixth one outside the catalogue. Effects take turns, so that none
         has two cases more than another of its kind; every factor takes turns within every effect.
+    rows_hz : float, optional
+        All logs are tables of so many rows a second.
     """
     n_none, n_outside = round(_NONE_SHARE * n), round(_OUTSIDE_SHARE * n)
     labels: list[tuple[Kind, str]] = [("none", "none")] * n_none
@@ -75,7 +79,7 @@ def design(n: int, seed: int) -> tuple[Case, ...]:
         columns = [_turns(f, count, seed, f"{label[1]} {k}") for k, f in enumerate(factors)]
         rows += [(label, *row) for row in zip(*columns, strict=True)]
     order = stream(seed, "order of the cases").permutation(n)
-    return tuple(_case(place, seed, *rows[k]) for place, k in enumerate(order))
+    return tuple(_case(place, seed, rows_hz, *rows[k]) for place, k in enumerate(order))
 
 
 def _turns(levels: tuple[T, ...], n: int, seed: int, purpose: str) -> list[T]:
@@ -87,9 +91,17 @@ def _turns(levels: tuple[T, ...], n: int, seed: int, purpose: str) -> list[T]:
 
 
 def _case(
-    place: int, seed: int, label: tuple[Kind, str], hull: str, noise: float, disturbance: str, strength: int, sold: bool
+    place: int,
+    seed: int,
+    rows_hz: float | None,
+    label: tuple[Kind, str],
+    hull: str,
+    noise: float,
+    disturbance: str,
+    strength: int,
+    sold: bool,
 ) -> Case:
     digest = hashlib.sha256(f"{seed} {place}".encode()).digest()
     own = int(np.frombuffer(digest[:4], dtype=np.uint32)[0])
-    formats = (FORMATS[place % 3], FORMATS[(place + 1) % 3])
-    return Case(digest[4:9].hex(), *label, hull, noise, disturbance, strength, sold, formats, own)
+    formats = ("csv", "csv") if rows_hz else (FORMATS[place % 3], FORMATS[(place + 1) % 3])
+    return Case(digest[4:9].hex(), *label, hull, noise, disturbance, strength, sold, formats, own, rows_hz)

@@ -2,7 +2,8 @@
 
 ``python -m benchmarks.diagnose.hidden_effects.score --cases DIR --answers ANSWERS --key KEY``.
 
-Writes ``benchmarks/results/hidden_effects.md`` and the confusion map beside it. Cases that the program was not asked
+Writes ``benchmarks/results/hidden_effects.md`` and the confusion map beside it; of tables of so many rows a second,
+``hidden_effects_2_hz.md``. Cases that the program was not asked
 about yet are left out and counted.
 """
 
@@ -36,7 +37,7 @@ def judged(truth: dict[str, Any], answers: Path, oracles: Path) -> list[Judged]:
     return found
 
 
-def page(cases: Sequence[Judged], asked: int) -> list[str]:
+def page(cases: Sequence[Judged], asked: int, name: str = _NAME) -> list[str]:
     """Return the lines of the page."""
     seconds = [one.said["seconds"]["diagnose"] for one in cases]
     lines = [
@@ -80,7 +81,7 @@ def page(cases: Sequence[Judged], asked: int) -> list[str]:
             ("condition", "level", "cases", "in a set, score >= 50", "not adequate without effect"), rows
         ),
         "",
-        f"![Named against true]({_NAME}.png)",
+        f"![Named against true]({name}.png)",
     ]
 
 
@@ -111,10 +112,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     oracles = given.answers.with_name(f"{given.answers.name}.oracle")
     all_with_the_truth(given.cases / "cases", truth, oracles)
     cases = judged(truth, given.answers, oracles)
-    draw_confusion(cases, result_page.RESULTS / f"{_NAME}.png")
+    hz = opened["rows_hz"]
+    name, rows, title = (f"{_NAME}_{hz:g}_hz", f" --rows-hz {hz:g}", f" (rows of {hz:g} Hz)") if hz else (_NAME, "", "")
+    draw_confusion(cases, result_page.RESULTS / f"{name}.png")
     result_page.write(
-        *(f"diagnose.{_NAME}", "Hidden effects: named, refused, missed", page(cases, opened["n"])),
-        options=f"--cases {opened['n']} --seed {opened['seed']}",
+        *(f"diagnose.{_NAME}", f"Hidden effects: named, refused, missed{title}", page(cases, opened["n"], name)),
+        options=f"--cases {opened['n']} --seed {opened['seed']}{rows}",
+        page=name,
     )
 
 

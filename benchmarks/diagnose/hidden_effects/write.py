@@ -35,16 +35,16 @@ from kempf.pipeline.simulate.trial import Trial, TrialSettings
 _CASES = 336
 
 
-def _csv(trial: Trial) -> bytes:
+def _csv(trial: Trial, case: Case) -> bytes:
     # every reading stands in two rows at least, by which a reader sees when it was new
     fastest = max(record.instrument.rate_hz for record in trial.instruments)
-    return to_csv(trial, max(10.0, 2.0 * fastest))
+    return to_csv(trial, case.rows_hz or max(10.0, 2.0 * fastest))
 
 
-_TO: dict[str, tuple[str, Callable[[Trial], bytes]]] = {
+_TO: dict[str, tuple[str, Callable[[Trial, Case], bytes]]] = {
     "csv": ("csv.gz", _csv),
-    "mcap": ("mcap", to_mcap),
-    "nmea": ("nmea.gz", to_nmea),
+    "mcap": ("mcap", lambda trial, _: to_mcap(trial)),
+    "nmea": ("nmea.gz", lambda trial, _: to_nmea(trial)),
 }
 
 
@@ -67,7 +67,7 @@ def logs_of(case: Case) -> tuple[dict[str, bytes], dict[str, Any]]:
         trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor, sold=case.sold)
         ending, write = _TO[case.formats[day]]
         begin = datetime.fromtimestamp(settings.start_utc_ns // 1_000_000_000, UTC)
-        files[f"{begin:%Y%m%dT%H%M}.{ending}"] = write(trial)
+        files[f"{begin:%Y%m%dT%H%M}.{ending}"] = write(trial, case)
     profile = logger_profile(_settings(case, hull, 0)).model_copy(update={"vessel": case.case_id})
     text = yaml.safe_dump(profile.model_dump(mode="json", exclude_defaults=True), sort_keys=False)
     files["profile.yaml"] = text.encode()
@@ -152,7 +152,14 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
     own.write_text(json.dumps(answer), encoding="utf-8")
 
 
-def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str], None] = print) -> str:
+def write_all(
+    out: Path,
+    key_file: Path,
+    n: int,
+    seed: int,
+    rows_hz: float | None = None,
+    show: Callable[[str], None] = print,
+) -> str:
     """Write all cases, seal the answers and return the SHA-256 of the sealed file.
 
     Parameters
@@ -161,7 +168,7 @@ def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str]
         Gets ``cases/`` and ``sealed.bin``.
     key_file : Path
         Made where it is not there; the answers in the making lie beside it.
-    n, seed : int
+    n, seed, rows_hz
         See `benchmarks.diagnose.hidden_effects.cases.design`.
     show : callable, optional
         Takes lines of progress.
@@ -172,13 +179,13 @@ def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str]
     if not key_file.exists():
         key_file.write_bytes(secrets.token_bytes(32))
         key_file.chmod(0o600)
-    cases = design(n, seed)
+    cases = design(n, seed, rows_hz)
     for done, case in enumerate(cases):
         write_case(case, folder, answers)
         if (done + 1) % 20 == 0 or done + 1 == n:
             show(f"{done + 1} of {n} cases")
     known = {case.case_id: json.loads((answers / f"{case.case_id}.json").read_text("utf-8")) for case in cases}
-    data = seal({"cases": known, "n": n, "seed": seed}, key_file.read_bytes())
+    data = seal({"cases": known, "n": n, "seed": seed, "rows_hz": rows_hz}, key_file.read_bytes())
     (out / "sealed.bin").write_bytes(data)
     shutil.rmtree(answers)
     return hashlib.sha256(data).hexdigest()
@@ -189,10 +196,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True)
     parser.add_argument("--cases", type=int, default=_CASES)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--rows-hz", type=float, help="all logs are tables of so many rows a second")
     parser.add_argument("--key", type=Path, help="key file, by default beside --out")
     given = parser.parse_args(arguments)
     key = given.key or given.out.parent / f"{given.out.name}.answer.key"
-    print(f"sealed.bin sha256 {write_all(given.out, key, given.cases, given.seed)}")
+    print(f"sealed.bin sha256 {write_all(given.out, key, given.cases, given.seed, given.rows_hz)}")
 
 
 if __name__ == "__main__":
