@@ -83,7 +83,8 @@ def _pooled(z: Sequence[Float], other: Sequence[Float], lags: Sequence[int]) -> 
     for k, lag in enumerate(lags):
         product, power_now, power_before, count = 0.0, 0.0, 0.0, 0
         for a, b in zip(z, other, strict=True):
-            now, before = (a[lag:], b[: b.size - lag]) if lag else (a, b)
+            # a run may be shorter than the longest lag
+            now, before = a[lag:], b[: max(b.size - lag, 0)]
             good = np.isfinite(now) & np.isfinite(before)
             product += float(now[good] @ before[good])
             power_now += float(now[good] @ now[good])
