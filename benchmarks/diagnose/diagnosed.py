@@ -30,7 +30,7 @@ def section(stated: Mapping[str, Any]) -> list[str]:
     """Return a vessel's part of the page."""
     lines = [f"## {stated['vessel']}: {stated['verdict'].replace('_', ' ')}", ""]
     lines += [f"- {sentence}" for sentence in stated["sentences"]]
-    lines += ["", *result_page.table(_LADDER, [_rung(stated, one) for one in stated["ladder"]]), ""]
+    lines += ["", *result_page.table(LADDER, [rung_row(stated, one) for one in stated["ladder"]]), ""]
     found = ("present", "immaterial", "suspected")
     shown = [c for c in stated["candidates"] if c["verdict"] in found]
     shown += [c for c in stated["candidates"] if c["verdict"] not in found and c["score"] is not None][:_SHOWN]
@@ -45,14 +45,15 @@ def section(stated: Mapping[str, Any]) -> list[str]:
     return [*lines, ""]
 
 
-_LADDER = (
+LADDER = (
     *("step", "added", "a leg ahead: fitted, %", "left out, %", "held out, %", "left out, worst, %"),
     *("free run: fitted, %", "held out, %", "yaw rate, deg/s", "heading, deg", "lateral speed, m/s"),
     *("wind, m/s²/√s", "log-likelihood"),
 )
 
 
-def _rung(stated: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
+def rung_row(stated: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
+    """Return one rung of a ladder, under the columns `LADDER`."""
     runs = one["held_out"] or one["in_sample"]
     rms = {
         channel: (sum((run[channel] or 0.0) ** 2 for run in runs.values()) / len(runs)) ** 0.5

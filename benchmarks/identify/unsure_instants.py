@@ -105,7 +105,7 @@ def thinned(data: Path, workers: Executor) -> Iterator[Outcome]:
         except KempfError as error:
             print(error.message)
             continue
-        yield outcome(ship.name, measured_ships.thinned(ship, 1.0), workers)
+        yield outcome(ship.name, measured_ships.thinned(ship, 1.0).runs(), workers)
 
 
 def page(

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass
+from math import sqrt
 
+from kempf.pipeline.channels.found_instants import AS_TAKEN, OTHERS, VELOCITY, FoundInstants
 from kempf.schemas.enumeration import listed
-
-#: channels that a velocity over ground comes from
-_VELOCITY = (
-    *("speed_over_ground", "course_over_ground", "velocity_north", "velocity_east"),
-    *("velocity_forward", "velocity_starboard"),
-)
-_OTHERS = ("heading", "yaw_rate", "rudder_angle")
 
 
 @dataclass(frozen=True)
@@ -30,18 +25,27 @@ class InstantErrors:
     rudder_s: float = 0.0
     #: Of the lateness of a velocity that may be smoothed, whether it was undone or not.
     smoothing_s: float = 0.0
+    #: What has been found of the others, and was taken out of the instants.
+    found: FoundInstants = AS_TAKEN
 
     @property
     def known(self) -> bool:
         """Whether all instants are those in the log."""
-        return not any(astuple(self))
+        return not any((self.velocity_s, self.heading_s, self.yaw_rate_s, self.rudder_s, self.smoothing_s))
+
+    @property
+    def row_s(self) -> float:
+        """Length of the rows in which an instrument measured somewhere, the longest; 0 where all instants are known."""
+        return sqrt(12.0) * max(self.velocity_s, self.heading_s, self.yaw_rate_s, self.rudder_s)
 
 
 #: of a log in which every reading has its instant
 IN_THE_LOG = InstantErrors()
 
 
-def instant_errors(instant_std_s: Mapping[str, float], late_std_s: float) -> InstantErrors:
+def instant_errors(
+    instant_std_s: Mapping[str, float], late_std_s: float, found: FoundInstants = AS_TAKEN
+) -> InstantErrors:
     """Return the errors of the instants of one log.
 
     Parameters
@@ -50,10 +54,12 @@ def instant_errors(instant_std_s: Mapping[str, float], late_std_s: float) -> Ins
         See `kempf.pipeline.channels.instruments.Instruments`.
     late_std_s : float
         Standard error of the lateness of a smoothed velocity, s.
+    found : FoundInstants, optional
+        What was taken out of the instants.
     """
-    velocity = max(instant_std_s.get(name, 0.0) for name in _VELOCITY)
-    heading, yaw_rate, rudder = (instant_std_s.get(name, 0.0) for name in _OTHERS)
-    return InstantErrors(velocity, heading, yaw_rate, rudder, late_std_s)
+    velocity = max(instant_std_s.get(name, 0.0) for name in VELOCITY)
+    heading, yaw_rate, rudder = (instant_std_s.get(name, 0.0) for name in OTHERS)
+    return InstantErrors(velocity, heading, yaw_rate, rudder, late_std_s, found)
 
 
 def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:
@@ -65,7 +71,7 @@ def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:
         See `kempf.pipeline.channels.instruments.Instruments`.
     """
     by_size: dict[str, list[str]] = {}
-    for name in (*_VELOCITY, *_OTHERS):
+    for name in (*VELOCITY, *OTHERS):
         if instant_std_s.get(name, 0.0) > 0.0:
             by_size.setdefault(f"{instant_std_s[name]:.1g}", []).append(name.replace("_", " "))
     return tuple(

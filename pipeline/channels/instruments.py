@@ -6,12 +6,13 @@ here, so that later rooms know one form only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
 import polars as pl
 
+from kempf.pipeline.channels.found_instants import AS_TAKEN, FoundInstants
 from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.holds import WITHIN, Held, find_held
@@ -62,10 +63,28 @@ class Instruments:
     #: Instants, UTC ns, of the readings of a channel that were left out, see
     #: `kempf.pipeline.channels.there_and_back.leaps`.
     left_out: dict[str, Nanoseconds] = field(default_factory=dict)
+    #: What was taken out of the instants of the log.
+    found: FoundInstants = AS_TAKEN
 
     def get(self, channel: str) -> Series | None:
         """Return the series of a channel, or None where the log lacks it."""
         return self.series.get(channel)
+
+    def moved(self, found: FoundInstants) -> Instruments:
+        """Return the log with each of its channels at the instants that were found.
+
+        What was found before is replaced. Velocities that were turned out of the ship's frame are turned again, by
+        the heading of their own instants.
+        """
+        if found == self.found:
+            return self
+        before, back = self.found.by_channel(), found.by_channel()
+        series = {name: one.earlier(back.get(name, 0) - before.get(name, 0)) for name, one in self.series.items()}
+        if "course_over_ground" in self.derived and "velocity_north" not in series:
+            turned = {name: one for name, one in series.items() if name not in self.derived}
+            _add_from_the_bow(turned, dict(self.sources), [])
+            series |= turned
+        return replace(self, series=series, found=found)
 
 
 def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
@@ -152,7 +171,7 @@ class _Table:
 def _put_in_the_middle(table: _Table, series: dict[str, Series], notes: list[str]) -> None:
     """Take what was measured at some time since the row before at the middle of that time."""
     for name in table.fresh:
-        series[name] = Series(series[name].time_utc_ns - round(0.5 * table.apart_s * SECOND_NS), series[name].value)
+        series[name] = series[name].earlier(round(0.5 * table.apart_s * SECOND_NS))
     why = "that repeat other instruments" if table.repeats else "as slow as instruments measure"
     notes.append(
         f"{listed(table.fresh)}: in rows of {table.apart_s:.2g} s, {why}: measured at some time since the row before, "

@@ -56,6 +56,10 @@ class Series:
         first, last = np.searchsorted(self.time_utc_ns, [start_ns, end_ns + 1])
         return Series(self.time_utc_ns[first:last], self.value[first:last])
 
+    def earlier(self, by_ns: int) -> Series:
+        """Return the values so much earlier; the very same by nothing."""
+        return Series(self.time_utc_ns - by_ns, self.value) if by_ns else self
+
     def with_points(self, time_utc_ns: Nanoseconds, value: Float) -> Series:
         """Return the series with more values, but for those at instants that it has.
 

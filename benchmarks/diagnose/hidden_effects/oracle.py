@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.diagnose.found_instants import at_found_instants
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
-from kempf.flows.jobs.identify.vessel_runs import assembled
+from kempf.flows.jobs.identify.vessel_runs import layout_of
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
 from kempf.pipeline.diagnose.screening.staged import staged
@@ -44,7 +45,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
         ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         try:
-            found = assembled(warehouse, choose(warehouse, folder.name), ModelSpec())
+            found = at_found_instants(layout_of(warehouse, choose(warehouse, folder.name), ModelSpec())).runs
             chosen, left = split(found.runs)
             fitted = [found.runs[i] for i in chosen]
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
+from kempf.flows.jobs.diagnose.found_instants import at_found_instants
 from kempf.flows.jobs.diagnose.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose_refreshed
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, Own, known_effects, named
 from kempf.flows.jobs.identify.vessel_model import Fitted, store_model
-from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns, layout_of
 from kempf.flows.process.cores import usable
 from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
@@ -33,6 +34,8 @@ class FullDiagnosis:
     chosen: Chosen
     runs: VesselRuns
     diagnosis: Diagnosis
+    #: Whether the runs are laid out at the instants of the log, as parameter sets are fitted.
+    as_taken: bool
 
 
 def diagnose_vessel(
@@ -76,7 +79,7 @@ def diagnose_again(
     """
     examined = examine(warehouse, chosen, spec, own, progress=progress)
     diagnosis, inputs = examined.diagnosis, inputs_of_diagnosis(chosen, spec, own)
-    fitted = Fitted(examined.runs, diagnosis.plain, diagnosis.way)
+    fitted = Fitted(examined.runs, diagnosis.plain, diagnosis.way) if examined.as_taken else None
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)
     content = {**as_json(diagnosis), "where": where_left(diagnosis, phases)}
@@ -114,17 +117,19 @@ def examine(
 
     ``only`` names the effects to screen instead of all.
     """
-    runs = assembled(warehouse, chosen, spec, progress)
+    listener = reported_to(progress)
+    made = at_found_instants(layout_of(warehouse, chosen, spec, progress), listener)
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         diagnosis = diagnose(
-            *(runs.runs, runs.spec, screened, workers, settings),
+            *(made.runs.runs, made.runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
-            listener=reported_to(progress),
+            listener=listener,
+            fitted=made.plain,
         )
     progress(1, 1, "done")
-    return FullDiagnosis(chosen, runs, diagnosis)
+    return FullDiagnosis(chosen, made.runs, diagnosis, made.as_taken)
 
 
 def _phases(examined: FullDiagnosis) -> dict[str, tuple[PhaseInterval, ...]]:

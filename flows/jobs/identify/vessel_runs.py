@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.identify.loads_of_logs import in_order, logs_in_order
 from kempf.flows.jobs.identify.parameter_set_of import arm_of
 from kempf.flows.jobs.ingest.log_channels import channels_of
 from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.found_instants import FoundInstants
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.cut import make_record
@@ -51,10 +52,43 @@ class Like:
     slip_m: float | None
 
 
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """What runs are laid out from; its fields are the parameters of `assemble`."""
+
+    instruments: Mapping[str, Instruments]
+    profile: VesselProfile
+    bounds: Sequence[tuple[str, Bounds]]
+    spec: ModelSpec
+    like: Like | None
+    laden: Mapping[str, float]
+    #: Why a segment is none of these, by its id.
+    skipped: Mapping[str, str]
+
+    def runs(self) -> VesselRuns:
+        """Lay the runs out."""
+        made = assemble(self.instruments, self.profile, self.bounds, self.spec, self.like, self.laden)
+        return replace(made, skipped={**self.skipped, **made.skipped})
+
+    def moved(self, found: Mapping[int, FoundInstants]) -> Layout:
+        """Return the same with the logs at instants of measurement that were found, by number of the log."""
+        logs, instruments = logs_in_order(self.bounds), dict(self.instruments)
+        for day, instants in found.items():
+            instruments[logs[day]] = instruments[logs[day]].moved(instants)
+        return replace(self, instruments=instruments)
+
+
 def assembled(
     warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent, like: Like | None = None
 ) -> VesselRuns:
     """Read the chosen segments from the warehouse and make runs of them; see `assemble`."""
+    return layout_of(warehouse, chosen, spec, progress, like).runs()
+
+
+def layout_of(
+    warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent, like: Like | None = None
+) -> Layout:
+    """Read the chosen segments from the warehouse."""
     instruments = {}
     for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
         progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
@@ -62,8 +96,7 @@ def assembled(
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
-    runs = assemble(instruments, profile, bounds, spec, like, chosen.loads)
-    return VesselRuns(runs.spec, runs.runs, runs.records, chosen.skipped | runs.skipped)
+    return Layout(instruments, profile, bounds, spec, like, chosen.loads, chosen.skipped)
 
 
 def assemble(

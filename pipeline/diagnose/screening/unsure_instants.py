@@ -3,8 +3,9 @@
 The instants of values in rows that sample their instruments (`kempf.pipeline.channels.instruments`) are known to a part
 of a row: some hundredths of a second, up to half a second. A fit believes them, and its hull is off by what they are
 off, in every manoeuvre of the log to one side. Here they are parameters of each log, with what is known of them as a
-normal distribution, and are found together with hull and effects by one step of Gauss and Newton: what that leaves is
-shown by `benchmarks.identify.unsure_instants`.
+normal distribution, and are found together with hull and effects by one step of Gauss and Newton. Where that step
+changes how well the runs fit, they are laid out anew at the instants that it finds, and the next one goes on from there
+(`kempf.flows.jobs.diagnose.found_instants`): what that leaves is shown by `benchmarks.identify.unsure_instants`.
 
 The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.undelayed_speeds`) is known no better, and is
 not found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and
@@ -16,12 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import hypot
 from types import MappingProxyType
 
 import numpy as np
 
+from kempf.pipeline.channels.found_instants import FoundInstants
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.screening.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.screening.nuisance import columns_of, orthonormal
@@ -49,6 +51,8 @@ _STEP_S = 0.05
 #: standard deviations of an instant that lies anywhere in a row: to the row's end, which is the most that it is moved,
 #: and over the whole row, by which two instruments may be apart
 _MOST, _APART = 3.0**0.5, 12.0**0.5
+#: how far beyond the most an instant may be found that lies there: it has an error, too
+_BEYOND = 1.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +63,12 @@ class WithInstants:
     fit: PooledFit
     #: Shape (6 + p, 6 + p). What is not known of the instants adds to the covariance of the fit.
     covariance: Float
+    #: By number of the log, what is found of its instants, together with what was found before.
+    found: Mapping[int, FoundInstants] = field(default_factory=dict)
+    #: Twice the log-likelihood that it gains.
+    gain: float = 0.0
+    #: Whether all that is found of them may be in the rows alone; else something is late itself.
+    within_rows: bool = True
 
     def std(self, size: int) -> Float:
         """Return the standard errors of the last parameters, wider by what the runs disagree about, shape (size,)."""
@@ -87,6 +97,7 @@ def with_instants(fit: PooledFit, workers: Executor, step: Float | float = 0.0) 
         return WithInstants(_moved(fit, step), np.zeros_like(covariance))
     std_s = np.array([one.std_s[log] for one in rows for log in one.logs])
     foreign = np.array([one.foreign for one in rows for _ in one.logs])
+    before_s = np.array([one.found_s[log] for one in rows for log in one.logs])
     places, parts = [], 0
     for one in late:
         places.append({log: parts + k for k, log in enumerate(one.logs)})
@@ -111,15 +122,29 @@ def with_instants(fit: PooledFit, workers: Executor, step: Float | float = 0.0) 
         score[free] += foreign[free] * (column[:, : free.size].T @ line.u)
     # what every column does beside the hull, and each to the hull
     beside, to_hull = own - across[:, :m].T @ covariance @ across, covariance @ across
-    score -= foreign * (across[:, :m].T @ step)
-    late_covariance = inverse(beside[:, :m] + np.diag(std_s**-2.0))
-    late_s = np.clip(late_covariance @ score, -_MOST * std_s, _MOST * std_s)
+    score -= foreign * (across[:, :m].T @ step + before_s * std_s**-2.0)
+    late_information = beside[:, :m] + np.diag(std_s**-2.0)
+    late_covariance = inverse(late_information)
+    total_s, most_s = before_s + late_covariance @ score, _MOST * std_s
+    late_s = np.clip(total_s, -most_s, most_s) - before_s
     # at the maximum the scores of what is shared are zero
     moved = _moved(fit, step - to_hull[:, :m] @ late_s)
     # the instants of rows follow a lateness that is only considered
     considered = to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]
     added: Float = to_hull[:, :m] @ late_covariance @ to_hull[:, :m].T + considered @ considered.T
-    return WithInstants(moved, added)
+    before = {filtered.run.day: filtered.run.instant_errors.found for filtered in fit.runs}
+    found = _found(before, rows, before_s + late_s)
+    gain = float(late_s @ (2.0 * score - late_information @ late_s))
+    return WithInstants(moved, added, found, gain, bool(np.all(np.abs(total_s) <= _BEYOND * most_s)))
+
+
+def _found(before: Mapping[int, FoundInstants], rows: Sequence[_Late], late_s: Float) -> dict[int, FoundInstants]:
+    """Return latenesses, in the order of the instruments and then of their logs, by log."""
+    values, found = iter(late_s.tolist()), dict(before)
+    for one in rows:
+        for log in one.logs:
+            found[log] = replace(found[log], **{one.of: next(values)})
+    return found
 
 
 def _moved(fit: PooledFit, step: Float) -> PooledFit:
@@ -167,6 +192,10 @@ class _Late:
     column: Float
     #: Standard deviation of the lateness by log, s; only logs of which it is not known.
     std_s: Mapping[int, float]
+    #: Field of `InstantErrors`; "" of a lateness that is only considered.
+    of: str = ""
+    #: What was found of it before, by log.
+    found_s: Mapping[int, float] = field(default_factory=dict)
     #: 0 where the model has the latency itself, which imitates it in full: at the maximum nothing is left of it to be
     #: found.
     foreign: float = 1.0
@@ -179,20 +208,20 @@ class _Late:
 
 def _rows(fit: PooledFit, workers: Executor) -> list[_Late]:
     """Return what a second of lateness does, of every instrument whose instants are not known in some log."""
-    errors = {
-        effect: [getattr(filtered.run.instant_errors, of) for filtered in fit.runs] for of, effect in _LATE.items()
-    }
-    unsure = {effect: std for effect, std in errors.items() if any(std)}
+    known = [filtered.run.instant_errors for filtered in fit.runs]
+    unsure = [(of, effect) for of, effect in _LATE.items() if any(getattr(errors, of) for errors in known)]
     has = [effect.name for effect in fit.model.effects]
-    tried = [effect for effect in unsure if effect not in has]
+    tried = [effect for _, effect in unsure if effect not in has]
     by_effect = dict(
         zip(tried, responses(fit, [EffectTrial(get(name), (_STEP_S,)) for name in tried], workers), strict=True)
     )
     rows = []
-    for effect, std in unsure.items():
+    for of, effect in unsure:
         column = _own(fit, has.index(effect)) if effect in has else by_effect[effect]
         if column is not None:
-            rows.append(_Late(column.ravel(), _by_log(fit, std), float(effect not in has)))
+            std_s = _by_log(fit, [getattr(errors, of) for errors in known])
+            before_s = {filtered.run.day: getattr(filtered.run.instant_errors.found, of) for filtered in fit.runs}
+            rows.append(_Late(column.ravel(), std_s, of, before_s, float(effect not in has)))
     return rows
 
 

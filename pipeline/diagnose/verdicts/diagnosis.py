@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 from kempf.pipeline.diagnose.screening.ridge_reference import RidgeReference, ridge_reference_of
 from kempf.pipeline.diagnose.screening.screen import screen
-from kempf.pipeline.diagnose.screening.staged import staged
+from kempf.pipeline.diagnose.screening.staged import PlainStage, staged
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.steps.by_likelihood import certain_ones
@@ -78,6 +78,7 @@ def diagnose(
     settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
     listener: Listener = SILENT,
+    fitted: PlainStage | None = None,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
 
@@ -93,10 +94,13 @@ def diagnose(
         Effects that the model has already.
     listener : Listener, optional
         Notified of what is being done and of every iteration.
+    fitted : PlainStage, optional
+        Of the runs that are not held out, where it is there already.
     """
     chosen, apart = split(runs)
-    listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
-    plain, fits = staged([runs[i] for i in chosen], spec, given, workers, listener=listener)
+    if fitted is None or given:
+        listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
+    plain, fits = staged([runs[i] for i in chosen], spec, given, workers, listener=listener, plain=fitted)
     base = fits[-1]
     held = [runs[i] for i in apart]
     shooting = None

@@ -1,0 +1,63 @@
+"""Measured logs thinned to a row a second: what a diagnosis finds with instants as they are taken, and found.
+
+Of such a log nobody can tell that its instruments measured at the rows, so a diagnosis lays its runs out at the
+instants that the plain model finds (decision 0111).
+"""
+
+from __future__ import annotations
+
+import argparse
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from benchmarks import measured_ships, result_page
+from benchmarks.diagnose.diagnosed import LADDER, rung_row
+from benchmarks.measured_ships import Ship
+from kempf.flows.jobs.diagnose.found_instants import PlainRuns, at_found_instants
+from kempf.flows.jobs.identify.vessel_runs import VesselRuns
+from kempf.flows.process.cores import usable
+from kempf.pipeline.diagnose.screening.staged import PlainStage
+from kempf.pipeline.diagnose.verdicts.diagnosis import diagnose
+from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
+from kempf.schemas.effects import catalogue
+
+_ROW_S = 1.0
+
+
+def _stated(runs: VesselRuns, plain: PlainStage | None) -> dict[str, Any]:
+    with ThreadPoolExecutor(usable()) as workers:
+        return as_json(diagnose(runs.runs, runs.spec, catalogue(), workers, fitted=plain))
+
+
+def _rows(ship: Ship) -> list[list[str]]:
+    layout = measured_ships.thinned(ship, _ROW_S)
+    found: PlainRuns = at_found_instants(layout)
+    rows = []
+    for words, runs, plain in (("as they are taken", layout.runs(), None), ("found", found.runs, found.plain)):
+        stated = _stated(runs, plain)
+        claimed = "; ".join(" or ".join(one["effects"]) for one in stated["sets"]) or "nothing"
+        for one in stated["ladder"]:
+            head = [ship.name, words, stated["verdict"].replace("_", " "), claimed] if one["step"] == 0 else [""] * 4
+            rows.append([*head, *rung_row(stated, one)])
+        print(" | ".join(rows[-1]), flush=True)
+    if found.as_taken:
+        rows.append([ship.name, "found", "the same: laid out as they are taken", *[""] * (len(rows[0]) - 3)])
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=result_page.DATA)
+    given = parser.parse_args()
+    rows = [row for make in (measured_ships.tank, measured_ships.pond) for row in _rows(make(given.data))]
+    lines = [
+        f"One row in {_ROW_S:g} s of the towing tank's and the pond's logs.",
+        "",
+        *result_page.table(["ship", "instants", "verdict", "claimed", *LADDER], rows),
+    ]
+    result_page.write("diagnose.slow_rows", "Measured logs, a row a second: the diagnosis", lines)
+
+
+if __name__ == "__main__":
+    main()
