@@ -9,8 +9,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from kempf.pipeline.compare.correlations import correlations
 from kempf.pipeline.compare.group import rms_band
 from kempf.pipeline.compare.misfit import where
+from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.predict.run_residuals import PhaseInterval, RunResiduals
 from tests.compare.seen import NOISE, QUIET, looked_at, run_of, sailed_by_model
 from tests.estimate.simulated import sailed, truth_of
@@ -141,3 +143,17 @@ def test_a_window_that_is_asked_for_again_holds_all_its_instants() -> None:
         begin, end = (np.datetime64(one[key][:-1], "ns").astype(np.int64) for key in ("start", "end"))
         instants = odd.start_utc_ns + np.round(odd.time_s * 1e9).astype(np.int64)
         assert np.count_nonzero((instants >= begin) & (instants <= end)) == 24
+
+
+def test_a_run_shorter_than_the_longest_lag_counts_where_it_has_pairs() -> None:
+    n = 30
+    fine = slice(ROWS * (n - 1) + 1)
+    cut = {
+        name: getattr(RUN, name)[:n] for name in ("rudder_noise", "measured", "offset_s", "current_row", "heading_rad")
+    }
+    short = replace(RUN, name="short", inputs=RUN.inputs[fine], **cut)
+    one, other = looked(2), looked_at(sailed_by_model(short, HULL), HULL)
+    assert one.filtered.run.step_s * n < 60.0
+    alone, both = (correlations(runs)["yaw_rate"]["auto"] for runs in ([one], [one, other]))
+    assert both["lag_s"] == alone["lag_s"] and both["rho"][0] != alone["rho"][0]
+    assert both["rho"][-1] == alone["rho"][-1], "beyond its end it has none"
