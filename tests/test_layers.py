@@ -62,7 +62,7 @@ ROOMS = {
     "pipeline/diagnose": {
         "settings": set(),
         "split": set(),
-        "screening": set(),
+        "screening": {"split"},
         "steps": {"settings", "screening"},
         "verdicts": {"settings", "split", "screening", "steps"},
         "evidence": {"screening", "steps", "verdicts"},

@@ -9,15 +9,12 @@ from __future__ import annotations
 import argparse
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import LADDER, rung_row
 from benchmarks.measured_ships import Ship
-from kempf.flows.jobs.diagnose.found_instants import PlainRuns, at_found_instants
-from kempf.flows.jobs.identify.vessel_runs import VesselRuns
 from kempf.flows.process.cores import usable
-from kempf.pipeline.diagnose.screening.staged import PlainStage
+from kempf.pipeline.diagnose.screening.found_instants import LayOut
 from kempf.pipeline.diagnose.verdicts.diagnosis import diagnose
 from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
 from kempf.schemas.effects import catalogue
@@ -25,25 +22,23 @@ from kempf.schemas.effects import catalogue
 _ROW_S = 1.0
 
 
-def _stated(runs: VesselRuns, plain: PlainStage | None) -> dict[str, Any]:
-    with ThreadPoolExecutor(usable()) as workers:
-        return as_json(diagnose(runs.runs, runs.spec, catalogue(), workers, fitted=plain))
-
-
 def _rows(ship: Ship) -> list[list[str]]:
     layout = measured_ships.thinned(ship, _ROW_S)
-    found: PlainRuns = at_found_instants(layout)
-    ways: list[tuple[str, VesselRuns, PlainStage | None]] = [("as they are taken", layout.runs(), None)]
-    if not found.as_taken:
-        ways.append(("found", found.runs, found.plain))
-    rows = []
-    for words, runs, plain in ways:
-        stated = _stated(runs, plain)
-        claimed = "; ".join(" or ".join(one["effects"]) for one in stated["sets"]) or "nothing"
-        for one in stated["ladder"]:
-            head = [ship.name, words, stated["verdict"].replace("_", " "), claimed] if one["step"] == 0 else [""] * 4
-            rows.append([*head, *rung_row(stated, one)])
-        print(" | ".join(rows[-1]), flush=True)
+    runs, rows = layout.runs(), list[list[str]]()
+    ways: dict[str, LayOut | None] = {"as they are taken": None, "found": lambda found: layout.moved(found).runs().runs}
+    with ThreadPoolExecutor(usable()) as workers:
+        for words, lay_out in ways.items():
+            diagnosis = diagnose(runs.runs, runs.spec, catalogue(), workers, lay_out=lay_out)
+            if lay_out is not None and not diagnosis.found:
+                break
+            stated = as_json(diagnosis)
+            claimed = "; ".join(" or ".join(one["effects"]) for one in stated["sets"]) or "nothing"
+            for one in stated["ladder"]:
+                head = (
+                    [ship.name, words, stated["verdict"].replace("_", " "), claimed] if one["step"] == 0 else [""] * 4
+                )
+                rows.append([*head, *rung_row(stated, one)])
+            print(" | ".join(rows[-1]), flush=True)
     return rows
 
 

@@ -35,7 +35,7 @@ class InstantErrors:
 
     @property
     def row_s(self) -> float:
-        """Length of the rows in which an instrument measured somewhere, the longest; 0 where all instants are known."""
+        """Length of a row in which an instrument measured somewhere, by the largest error; 0 where all are known."""
         return sqrt(12.0) * max(self.velocity_s, self.heading_s, self.yaw_rate_s, self.rudder_s)
 
 

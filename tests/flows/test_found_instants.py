@@ -5,29 +5,31 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import astuple, dataclass, replace
 from pathlib import Path
+from shutil import copytree
 
 import numpy as np
 import pytest
 
 from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.diagnose.found_instants import PlainRuns, at_found_instants
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
 from kempf.flows.jobs.identify.vessel_model import store_model
-from kempf.flows.jobs.identify.vessel_runs import Layout, assembled, layout_of
+from kempf.flows.jobs.identify.vessel_runs import Layout, layout_of
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.channels.found_instants import AS_TAKEN, FoundInstants
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Series
-from kempf.pipeline.diagnose.screening.staged import plain_stage
+from kempf.pipeline.diagnose.screening.found_instants import FittedRuns, at_found_instants, fitted_runs
 from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
+from kempf.schemas.effects import get
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.units import MILLISECOND_NS, SECOND_NS
 from kempf.warehouse.storage.store import Warehouse
+from kempf.warehouse.tables import parameter_sets
 from tests.flows.content import fresh
 
 DAY_NS = 86_400_000_000_000
@@ -42,7 +44,8 @@ class Sailed:
     trials: list[Trial]
     warehouse: Warehouse
     layout: Layout
-    found: PlainRuns
+    as_taken: FittedRuns
+    found: FittedRuns
 
 
 def trial_of(day: int) -> Trial:
@@ -62,7 +65,23 @@ def laid_out(trials: list[Trial], folder: Path) -> tuple[Warehouse, Layout]:
 def sailed(tmp_path_factory: pytest.TempPathFactory) -> Sailed:
     trials = [trial_of(day) for day in (0, 1)]
     warehouse, layout = laid_out(trials, tmp_path_factory.mktemp("sailed"))
-    return Sailed(trials, warehouse, layout, at_found_instants(layout))
+    return Sailed(trials, warehouse, layout, fitted_of(layout), found_in(layout))
+
+
+def fitted_of(layout: Layout, *effects: str) -> FittedRuns:
+    runs = layout.runs()
+    with ThreadPoolExecutor(2) as workers:
+        return fitted_runs(runs.runs, runs.spec, [get(name) for name in effects], workers)
+
+
+def found_in(layout: Layout, *effects: str) -> FittedRuns:
+    with ThreadPoolExecutor(2) as workers:
+        return at_found_instants(
+            fitted_of(layout, *effects),
+            lambda found: layout.moved(found).runs().runs,
+            [get(name) for name in effects],
+            workers,
+        )
 
 
 def lateness_s(trial: Trial, name: str) -> float:
@@ -78,8 +97,8 @@ def lateness_s(trial: Trial, name: str) -> float:
 
 
 def test_instants_are_found_where_the_instruments_measured(sailed: Sailed) -> None:
-    assert [run.day for run in sailed.found.runs.runs] == [0, 1] and not sailed.found.as_taken
-    for day, run in enumerate(sailed.found.runs.runs):
+    assert [run.day for run in sailed.found.runs] == [0, 1] and sailed.found.found
+    for day, run in enumerate(sailed.found.runs):
         for field, (name, sign) in INSTRUMENTS.items():
             right = sign * lateness_s(sailed.trials[day], name)
             # the velocity's is hardly seen, and stays near the middle of the row
@@ -87,10 +106,9 @@ def test_instants_are_found_where_the_instruments_measured(sailed: Sailed) -> No
             assert abs(off) < (0.2 if field == "velocity_s" else 0.1), (day, field, off)
 
 
-def test_the_runs_fit_and_agree_as_they_do_with_known_instants(sailed: Sailed) -> None:
-    fit, runs = sailed.found.plain.fit, sailed.layout.runs()
+def test_the_runs_fit_better_and_the_hull_is_right(sailed: Sailed) -> None:
+    as_taken, fit = sailed.as_taken.fits[-1], sailed.found.fits[-1]
     with ThreadPoolExecutor(2) as workers:
-        as_taken = plain_stage(runs.runs, runs.spec, workers).fit
         first, settled = (with_instants(one, workers) for one in (as_taken, fit))
     assert first.gain > 50.0 and settled.gain < 6.0
     assert fit.log_likelihood > as_taken.log_likelihood + 0.2 * first.gain
@@ -100,9 +118,9 @@ def test_the_runs_fit_and_agree_as_they_do_with_known_instants(sailed: Sailed) -
 
 
 def test_laid_out_anew_from_anew_is_the_same(sailed: Sailed) -> None:
-    found = {run.day: run.instant_errors.found for run in sailed.found.runs.runs}
+    found = {run.day: run.instant_errors.found for run in sailed.found.runs}
     layout = sailed.layout.moved({day: FoundInstants(0.1, 0.1, 0.1, 0.1) for day in found}).moved(found)
-    for one, other in zip(sailed.found.runs.runs, layout.runs().runs, strict=True):
+    for one, other in zip(sailed.found.runs, layout.runs().runs, strict=True):
         assert np.array_equal(one.measured, other.measured, equal_nan=True)
         assert np.array_equal(one.inputs, other.inputs) and np.array_equal(one.offset_s, other.offset_s)
     back = layout.moved(dict.fromkeys(found, AS_TAKEN))
@@ -117,19 +135,37 @@ def test_what_is_later_than_its_rows_allow_stays_to_be_diagnosed(sailed: Sailed)
         log_id: replace(one, series={**one.series, "yaw_rate": one.series["yaw_rate"].earlier(-late_ns)})
         for log_id, one in sailed.layout.instruments.items()
     }
-    made = at_found_instants(replace(sailed.layout, instruments=late))
-    assert made.as_taken and all(run.instant_errors.found == AS_TAKEN for run in made.runs.runs)
+    made = found_in(replace(sailed.layout, instruments=late))
+    assert not made.found and all(run.instant_errors.found == AS_TAKEN for run in made.runs)
 
 
-def test_a_ship_of_slow_rows_lacks_nothing_and_her_model_is_that_of_identification(sailed: Sailed) -> None:
+def test_a_dead_time_of_the_model_is_not_taken_for_the_rows(sailed: Sailed) -> None:
+    early_ns = round(0.5 * SECOND_NS)
+    early = {
+        log_id: replace(one, series={**one.series, "rudder_angle": one.series["rudder_angle"].earlier(early_ns)})
+        for log_id, one in sailed.layout.instruments.items()
+    }
+    layout = replace(sailed.layout, instruments=early)
+    as_taken, made = (fits[-1] for fits in (fitted_of(layout, "dead_time").fits, found_in(layout, "dead_time").fits))
+    assert as_taken.values[-1] > 0.2
+    assert made.values[-1] == pytest.approx(as_taken.values[-1], abs=0.15)
+
+
+def test_a_ship_of_slow_rows_lacks_nothing_and_her_model_is_that_of_identification(
+    sailed: Sailed, tmp_path: Path
+) -> None:
+    folder = sailed.warehouse.folder
+    assert folder is not None
+    other = Warehouse(str(copytree(folder, tmp_path / "w")))
     stored, _ = diagnose_vessel(sailed.warehouse, "ferry", ModelSpec())
     assert not stored.effects and stored.verdict == "insufficient_data"
     assert stored.content["sets"] == stored.content["immaterial"] == []
-    chosen = choose(sailed.warehouse, "ferry")
-    again, new = store_model(sailed.warehouse, chosen, ModelSpec(), NONE_OF_ONES_OWN)
-    assert not new and again.parameter_set_id == stored.parameter_set_id
-    instants = {run.name: run.instant_errors.found for run in assembled(sailed.warehouse, chosen, ModelSpec()).runs}
-    assert set(instants.values()) == {AS_TAKEN}
+    assert len(stored.content["instants"]) == 2 and "middle of the row" in stored.content["sentences"][-1]
+    base = parameter_sets.get(sailed.warehouse, stored.parameter_set_id)
+    again, new = store_model(other, choose(other, "ferry"), ModelSpec(), NONE_OF_ONES_OWN)
+    assert new and again.parameter_set_id == base.parameter_set_id
+    assert again.parameters == base.parameters and again.convergence == base.convergence
+    assert stored.content["ladder"][0]["log_likelihood"] > base.convergence["log_likelihood"] + 20.0
 
 
 def test_velocities_of_the_ship_s_frame_are_turned_by_the_heading_of_their_instants() -> None:

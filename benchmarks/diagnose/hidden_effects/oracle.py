@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from kempf.flows.jobs.diagnose.found_instants import at_found_instants
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import layout_of
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import ingest
-from kempf.pipeline.diagnose.screening.staged import staged
+from kempf.pipeline.diagnose.screening.found_instants import at_found_instants, fitted_runs
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.predict.free_run import free_run
 from kempf.schemas.effects import catalogue
@@ -45,12 +44,13 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
         ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         try:
-            found = at_found_instants(layout_of(warehouse, choose(warehouse, folder.name), ModelSpec())).runs
-            chosen, left = split(found.runs)
-            fitted = [found.runs[i] for i in chosen]
+            layout = layout_of(warehouse, choose(warehouse, folder.name), ModelSpec())
+            laid = layout.runs()
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-                _, fits = staged(fitted, found.spec, [catalogue()[effect]], workers)
-            held = [found.runs[i] for i in left]
+                plain = fitted_runs(laid.runs, laid.spec, (), workers)
+                made = at_found_instants(plain, lambda found: layout.moved(found).runs().runs, (), workers)
+                fits = fitted_runs(made.runs, laid.spec, [catalogue()[effect]], workers).fits
+            held = [made.runs[i] for i in split(made.runs)[1]]
             # lasting noise of instruments as they are sold may stand before it
             first = int(np.argmax(fits[1].model.own(effect)))
             return {

@@ -3,7 +3,7 @@
 ``python -m benchmarks.diagnose.hidden_effects.score --cases DIR --answers ANSWERS --key KEY``.
 
 Writes ``benchmarks/results/hidden_effects.md`` and the confusion map beside it; of tables of so many rows a second,
-``hidden_effects_2_hz.md``. Cases that the program was not asked
+``hidden_effects_HZ_hz.md``. Cases that the program was not asked
 about yet are left out and counted.
 """
 
@@ -112,7 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     oracles = given.answers.with_name(f"{given.answers.name}.oracle")
     all_with_the_truth(given.cases / "cases", truth, oracles)
     cases = judged(truth, given.answers, oracles)
-    hz = opened["rows_hz"]
+    hz = opened.get("rows_hz")
     name, rows, title = (f"{_NAME}_{hz:g}_hz", f" --rows-hz {hz:g}", f" (rows of {hz:g} Hz)") if hz else (_NAME, "", "")
     draw_confusion(cases, result_page.RESULTS / f"{name}.png")
     result_page.write(

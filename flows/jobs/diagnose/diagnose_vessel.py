@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 
-from kempf.flows.jobs.diagnose.found_instants import at_found_instants
 from kempf.flows.jobs.diagnose.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.identify.chosen_manoeuvres import Chosen, choose_refreshed
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN, Own, known_effects, named
@@ -14,6 +14,7 @@ from kempf.flows.jobs.identify.vessel_runs import VesselRuns, layout_of
 from kempf.flows.process.cores import usable
 from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.found_instants import FoundInstants
 from kempf.pipeline.diagnose.evidence.evidence import evidence_of
 from kempf.pipeline.diagnose.evidence.manoeuvre_evidence import SailedZigzag
 from kempf.pipeline.diagnose.evidence.misfit import where_left
@@ -34,8 +35,10 @@ class FullDiagnosis:
     chosen: Chosen
     runs: VesselRuns
     diagnosis: Diagnosis
-    #: Whether the runs are laid out at the instants of the log, as parameter sets are fitted.
-    as_taken: bool
+    #: Laid out with the instants of measurement as they are taken, to which parameter sets are fitted.
+    as_taken: VesselRuns
+    #: By log, the instants that were found, at which ``runs`` are laid out.
+    instants: Mapping[str, FoundInstants]
 
 
 def diagnose_vessel(
@@ -79,10 +82,11 @@ def diagnose_again(
     """
     examined = examine(warehouse, chosen, spec, own, progress=progress)
     diagnosis, inputs = examined.diagnosis, inputs_of_diagnosis(chosen, spec, own)
-    fitted = Fitted(examined.runs, diagnosis.plain, diagnosis.way) if examined.as_taken else None
+    fitted = Fitted(examined.as_taken, diagnosis.as_taken.plain, diagnosis.as_taken.fits)
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)
-    content = {**as_json(diagnosis), "where": where_left(diagnosis, phases)}
+    instants = {log_id: asdict(found) for log_id, found in examined.instants.items()}
+    content = {**as_json(diagnosis), "where": where_left(diagnosis, phases), "instants": instants}
     row = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
         vessel=chosen.vessel,
@@ -117,19 +121,21 @@ def examine(
 
     ``only`` names the effects to screen instead of all.
     """
-    listener = reported_to(progress)
-    made = at_found_instants(layout_of(warehouse, chosen, spec, progress), listener)
+    layout = layout_of(warehouse, chosen, spec, progress)
+    runs = layout.runs()
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         diagnosis = diagnose(
-            *(made.runs.runs, made.runs.spec, screened, workers, settings),
+            *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
-            listener=listener,
-            fitted=made.plain,
+            listener=reported_to(progress),
+            lay_out=lambda found: layout.moved(found).runs().runs,
         )
     progress(1, 1, "done")
-    return FullDiagnosis(chosen, made.runs, diagnosis, made.as_taken)
+    instants = {log_id: diagnosis.found[day] for day, log_id in enumerate(layout.logs) if day in diagnosis.found}
+    laid_out = layout.moved(diagnosis.found).runs() if instants else runs
+    return FullDiagnosis(chosen, laid_out, diagnosis, runs, instants)
 
 
 def _phases(examined: FullDiagnosis) -> dict[str, tuple[PhaseInterval, ...]]:

@@ -65,6 +65,11 @@ class Layout:
     #: Why a segment is none of these, by its id.
     skipped: Mapping[str, str]
 
+    @property
+    def logs(self) -> list[str]:
+        """The logs in the order of their numbers."""
+        return logs_in_order(self.bounds)
+
     def runs(self) -> VesselRuns:
         """Lay the runs out."""
         made = assemble(self.instruments, self.profile, self.bounds, self.spec, self.like, self.laden)
@@ -72,9 +77,9 @@ class Layout:
 
     def moved(self, found: Mapping[int, FoundInstants]) -> Layout:
         """Return the same with the logs at instants of measurement that were found, by number of the log."""
-        logs, instruments = logs_in_order(self.bounds), dict(self.instruments)
+        instruments = dict(self.instruments)
         for day, instants in found.items():
-            instruments[logs[day]] = instruments[logs[day]].moved(instants)
+            instruments[self.logs[day]] = instruments[self.logs[day]].moved(instants)
         return replace(self, instruments=instruments)
 
 

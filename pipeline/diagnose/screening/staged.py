@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,39 +24,6 @@ from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
 
 
-@dataclass(frozen=True, eq=False)
-class PlainStage:
-    """The plain ship."""
-
-    #: Its search.
-    search: PlainFit
-    #: What it came to, with the noise that the data show.
-    fit: PooledFit
-
-
-def plain_stage(
-    runs: Sequence[GridRun],
-    spec: ModelSpec,
-    workers: Executor,
-    settings: MaximumLikelihoodSettings = STANDARD,
-    listener: Listener = SILENT,
-) -> PlainStage:
-    """Fit the plain ship with the noise that the data show.
-
-    Parameters
-    ----------
-    settings : MaximumLikelihoodSettings, optional
-        Of the search of single runs.
-    listener : Listener, optional
-        Notified of every iteration and where they ended.
-    """
-    listener.begins("fitting the plain model")
-    plain = fit_plain(runs, spec, workers, settings, listener)
-    fit = with_instrument_noise(plain.fit, workers, listener)
-    listener.fitted(fit.last)
-    return PlainStage(plain, fit)
-
-
 def staged(
     runs: Sequence[GridRun],
     spec: ModelSpec,
@@ -65,7 +31,6 @@ def staged(
     workers: Executor,
     settings: MaximumLikelihoodSettings = STANDARD,
     listener: Listener = SILENT,
-    plain: PlainStage | None = None,
 ) -> tuple[PlainFit, list[PooledFit]]:
     """Fit the plain ship, then with one effect more after the other; each with the noise that the data show.
 
@@ -77,8 +42,6 @@ def staged(
         Of the search of single runs.
     listener : Listener, optional
         Notified of every model that is fitted, of its iterations and where they ended.
-    plain : PlainStage, optional
-        Of these runs, where it is there already.
 
     Returns
     -------
@@ -92,8 +55,10 @@ def staged(
         ``effect_not_testable``: these runs say nothing of an effect, or a channel measures it already; the
         message says which.
     """
-    first = plain or plain_stage(runs, spec, workers, settings, listener)
-    fits = [first.fit]
+    listener.begins("fitting the plain model")
+    plain = fit_plain(runs, spec, workers, settings, listener)
+    fits = [with_instrument_noise(plain.fit, workers, listener)]
+    listener.fitted(fits[-1].last)
     for effect in effects:
         candidate = score(fits[-1], effect, workers)
         if candidate.missing:
@@ -122,4 +87,4 @@ def staged(
         more = added(fits[-1], candidate, workers, listener=listener)
         fits.append(with_instrument_noise(more, workers, listener))
         listener.fitted(fits[-1].last)
-    return first.search, fits
+    return plain, fits

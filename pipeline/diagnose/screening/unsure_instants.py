@@ -3,9 +3,9 @@
 The instants of values in rows that sample their instruments (`kempf.pipeline.channels.instruments`) are known to a part
 of a row: some hundredths of a second, up to half a second. A fit believes them, and its hull is off by what they are
 off, in every manoeuvre of the log to one side. Here they are parameters of each log, with what is known of them as a
-normal distribution, and are found together with hull and effects by one step of Gauss and Newton. Where that step
-changes how well the runs fit, they are laid out anew at the instants that it finds, and the next one goes on from there
-(`kempf.flows.jobs.diagnose.found_instants`): what that leaves is shown by `benchmarks.identify.unsure_instants`.
+normal distribution, and are found together with hull and effects by one step of Gauss and Newton: what that leaves is
+shown by `benchmarks.identify.unsure_instants`. A diagnosis lays the runs out anew at the instants that the step finds,
+and the next one goes on from there (`kempf.pipeline.diagnose.screening.found_instants`).
 
 The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.undelayed_speeds`) is known no better, and is
 not found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and

@@ -13,9 +13,10 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
+from kempf.pipeline.channels.found_instants import FoundInstants
+from kempf.pipeline.diagnose.screening.found_instants import FittedRuns, LayOut, at_found_instants, fitted_runs
 from kempf.pipeline.diagnose.screening.ridge_reference import RidgeReference, ridge_reference_of
 from kempf.pipeline.diagnose.screening.screen import screen
-from kempf.pipeline.diagnose.screening.staged import PlainStage, staged
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.steps.by_likelihood import certain_ones
@@ -68,6 +69,11 @@ class Diagnosis:
     held: tuple[GridRun, ...]
     plain: PlainFit
     settings: DiagnosisSettings
+    #: The diagnosed model and those on the way to it, as parameter sets are fitted: with the instants of measurement as
+    #: they are taken. It is what was diagnosed where none were found.
+    as_taken: FittedRuns
+    #: By number of the log, the instants that were found, at which the runs are laid out.
+    found: Mapping[int, FoundInstants]
 
 
 def diagnose(
@@ -78,7 +84,7 @@ def diagnose(
     settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
     listener: Listener = SILENT,
-    fitted: PlainStage | None = None,
+    lay_out: LayOut | None = None,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
 
@@ -94,15 +100,16 @@ def diagnose(
         Effects that the model has already.
     listener : Listener, optional
         Notified of what is being done and of every iteration.
-    fitted : PlainStage, optional
-        Of the runs that are not held out, where it is there already.
+    lay_out : callable, optional
+        Lays all runs out at other instants of measurement; without it they stay as they are.
     """
     chosen, apart = split(runs)
-    if fitted is None or given:
-        listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
-    plain, fits = staged([runs[i] for i in chosen], spec, given, workers, listener=listener, plain=fitted)
-    base = fits[-1]
-    held = [runs[i] for i in apart]
+    listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
+    as_taken = made = fitted_runs(runs, spec, given, workers, listener)
+    if lay_out is not None:
+        made = at_found_instants(as_taken, lay_out, given, workers, listener)
+    fits, base = made.fits, made.fits[-1]
+    held = [made.runs[i] for i in apart]
     shooting = None
     if len(chosen) > 1:
         listener.begins("predicting one leg ahead")
@@ -128,7 +135,7 @@ def diagnose(
     claimed = without_members(steps[:kept])
     sizes = final_sizes(claimed, workers, listener)
     return Diagnosis(
-        way=tuple(fits),
+        way=fits,
         given=rungs,
         steps=tuple(claimed),
         sizes=sizes,
@@ -141,8 +148,10 @@ def diagnose(
         remaining=None if ahead is None else remaining_misfit(ahead, workers),
         fitted=tuple(filtered.run for filtered in base.runs),
         held=tuple(held),
-        plain=plain,
+        plain=made.plain,
         settings=settings,
+        as_taken=as_taken,
+        found=made.found,
     )
 
 

@@ -27,6 +27,12 @@ _LEAST_SHARE = 0.005
 _NAMED = 3
 #: of what is left where nothing is seen in it
 _REST = "; neither a known effect nor a smooth force of unknown origin improves on the rest"
+#: said where instants of measurement were found
+_LAID_OUT = (
+    "The rows of the logs do not show when in a row an instrument measured: here the manoeuvres are laid out at the "
+    "instants that fit the model best, so that errors are smaller than those of her stored parameter sets, which take "
+    "the middle of the row."
+)
 #: said of the free runs of such a ship
 _UNSTABLE = (
     " With these parameters she does not keep a straight course by herself, so that the free run of any model leaves "
@@ -36,6 +42,10 @@ _UNSTABLE = (
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
     """Return what a person should read first, a sentence each."""
+    return [*_findings(diagnosis), *((_LAID_OUT,) if diagnosis.found else ())]
+
+
+def _findings(diagnosis: Diagnosis) -> list[str]:
     lines = _given(diagnosis)
     outcome = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
