@@ -12,7 +12,7 @@ import numpy as np
 
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
-from kempf.flows.jobs.identify.vessel_runs import Layout, VesselRuns, assembled
+from kempf.flows.jobs.identify.vessel_runs import RunLayout, VesselRuns, assembled
 from kempf.flows.jobs.ingest.files import read_profiles
 from kempf.flows.jobs.ingest.ingest_logs import IngestOutcome, ingest
 from kempf.pipeline.channels.instruments import from_readings
@@ -116,7 +116,7 @@ def _laid_out(ship: Ship) -> VesselRuns:
         return assembled(warehouse, choose(warehouse, ship.name), default_model_of(warehouse, ship.name))
 
 
-def thinned(ship: Ship, row_s: float) -> Layout:
+def thinned(ship: Ship, row_s: float) -> RunLayout:
     """Return what the manoeuvres of a ship are laid out from, of a part of the rows of her logs, so far apart."""
     with TemporaryDirectory() as folder:
         warehouse = Warehouse(str(Path(folder) / "warehouse"))
@@ -130,7 +130,7 @@ def thinned(ship: Ship, row_s: float) -> Layout:
             instruments[log_id] = from_readings(whole.gather_every(round(row_s / apart_s)))
         bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
         profile = vessels.get(warehouse, chosen.profile_sha256)
-        return Layout(instruments, profile, bounds, default_model_of(warehouse, ship.name), None, chosen.loads, {})
+        return RunLayout(instruments, profile, bounds, default_model_of(warehouse, ship.name), None, chosen.loads, {})
 
 
 def ordered(file_name: str) -> Run:

@@ -25,7 +25,7 @@ _ROW_S = 1.0
 def _rows(ship: Ship) -> list[list[str]]:
     layout = measured_ships.thinned(ship, _ROW_S)
     runs, rows = layout.runs(), list[list[str]]()
-    ways: dict[str, LayOut | None] = {"as they are taken": None, "found": lambda found: layout.moved(found).runs().runs}
+    ways: dict[str, LayOut | None] = {"as they are taken": None, "found": layout.runs_at}
     with ThreadPoolExecutor(usable()) as workers:
         for words, lay_out in ways.items():
             diagnosis = diagnose(runs.runs, runs.spec, catalogue(), workers, lay_out=lay_out)

@@ -14,7 +14,7 @@ from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.standing_model import NONE_OF_ONES_OWN
 from kempf.flows.jobs.identify.vessel_model import store_model
-from kempf.flows.jobs.identify.vessel_runs import Layout, layout_of
+from kempf.flows.jobs.identify.vessel_runs import RunLayout, layout_of
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.channels.found_instants import AS_TAKEN, FoundInstants
 from kempf.pipeline.channels.instruments import Instruments
@@ -43,7 +43,7 @@ INSTRUMENTS |= {"rudder_s": ("rudder", -1)}
 class Sailed:
     trials: list[Trial]
     warehouse: Warehouse
-    layout: Layout
+    layout: RunLayout
     as_taken: FittedRuns
     found: FittedRuns
 
@@ -53,7 +53,7 @@ def trial_of(day: int) -> Trial:
     return simulate_trial(replace(settings, start_utc_ns=settings.start_utc_ns + day * DAY_NS))
 
 
-def laid_out(trials: list[Trial], folder: Path) -> tuple[Warehouse, Layout]:
+def laid_out(trials: list[Trial], folder: Path) -> tuple[Warehouse, RunLayout]:
     warehouse = fresh(folder / "w")
     for day, trial in enumerate(trials):
         log = LogFile(to_csv(trial, rate_hz=1.0 / ROW_S))
@@ -68,17 +68,17 @@ def sailed(tmp_path_factory: pytest.TempPathFactory) -> Sailed:
     return Sailed(trials, warehouse, layout, fitted_of(layout), found_in(layout))
 
 
-def fitted_of(layout: Layout, *effects: str) -> FittedRuns:
+def fitted_of(layout: RunLayout, *effects: str) -> FittedRuns:
     runs = layout.runs()
     with ThreadPoolExecutor(2) as workers:
         return fitted_runs(runs.runs, runs.spec, [get(name) for name in effects], workers)
 
 
-def found_in(layout: Layout, *effects: str) -> FittedRuns:
+def found_in(layout: RunLayout, *effects: str) -> FittedRuns:
     with ThreadPoolExecutor(2) as workers:
         return at_found_instants(
             fitted_of(layout, *effects),
-            lambda found: layout.moved(found).runs().runs,
+            layout.runs_at,
             [get(name) for name in effects],
             workers,
         )

@@ -48,7 +48,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
             laid = layout.runs()
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
                 plain = fitted_runs(laid.runs, laid.spec, (), workers)
-                made = at_found_instants(plain, lambda found: layout.moved(found).runs().runs, (), workers)
+                made = at_found_instants(plain, layout.runs_at, (), workers)
                 fits = fitted_runs(made.runs, laid.spec, [catalogue()[effect]], workers).fits
             held = [made.runs[i] for i in split(made.runs)[1]]
             # lasting noise of instruments as they are sold may stand before it

@@ -3,8 +3,7 @@
 ``python -m benchmarks.diagnose.hidden_effects.score --cases DIR --answers ANSWERS --key KEY``.
 
 Writes ``benchmarks/results/hidden_effects.md`` and the confusion map beside it; of tables of so many rows a second,
-``hidden_effects_HZ_hz.md``. Cases that the program was not asked
-about yet are left out and counted.
+``hidden_effects_HZ_hz.md``. Cases that the program was not asked about yet are left out and counted.
 """
 
 from __future__ import annotations

@@ -130,7 +130,7 @@ def examine(
             *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
             listener=reported_to(progress),
-            lay_out=lambda found: layout.moved(found).runs().runs,
+            lay_out=layout.runs_at,
         )
     progress(1, 1, "done")
     instants = {log_id: diagnosis.found[day] for day, log_id in enumerate(layout.logs) if day in diagnosis.found}

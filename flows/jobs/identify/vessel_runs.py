@@ -53,7 +53,7 @@ class Like:
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class RunLayout:
     """What runs are laid out from; its fields are the parameters of `assemble`."""
 
     instruments: Mapping[str, Instruments]
@@ -75,12 +75,16 @@ class Layout:
         made = assemble(self.instruments, self.profile, self.bounds, self.spec, self.like, self.laden)
         return replace(made, skipped={**self.skipped, **made.skipped})
 
-    def moved(self, found: Mapping[int, FoundInstants]) -> Layout:
+    def moved(self, found: Mapping[int, FoundInstants]) -> RunLayout:
         """Return the same with the logs at instants of measurement that were found, by number of the log."""
-        instruments = dict(self.instruments)
+        logs, instruments = self.logs, dict(self.instruments)
         for day, instants in found.items():
-            instruments[self.logs[day]] = instruments[self.logs[day]].moved(instants)
+            instruments[logs[day]] = instruments[logs[day]].moved(instants)
         return replace(self, instruments=instruments)
+
+    def runs_at(self, found: Mapping[int, FoundInstants]) -> tuple[GridRun, ...]:
+        """Lay the runs out at instants that were found, as `pipeline.diagnose.screening.found_instants` asks for it."""
+        return self.moved(found).runs().runs
 
 
 def assembled(
@@ -92,7 +96,7 @@ def assembled(
 
 def layout_of(
     warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent, like: Like | None = None
-) -> Layout:
+) -> RunLayout:
     """Read the chosen segments from the warehouse."""
     instruments = {}
     for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
@@ -101,7 +105,7 @@ def layout_of(
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
-    return Layout(instruments, profile, bounds, spec, like, chosen.loads, chosen.skipped)
+    return RunLayout(instruments, profile, bounds, spec, like, chosen.loads, chosen.skipped)
 
 
 def assemble(
