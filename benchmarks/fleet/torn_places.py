@@ -112,7 +112,7 @@ class Bucket(Place):
         from pyarrow import fs
 
         port = free_port()
-        command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+        command = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
         folder.mkdir(parents=True, exist_ok=True)
         stack.enter_context(running(command, environment(), folder / "server.log", port=port))
         self.settings = {**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import sqrt
 
 from kempf.pipeline.channels.found_instants import AS_TAKEN, OTHERS, VELOCITY, FoundInstants
 from kempf.schemas.enumeration import listed
@@ -32,11 +31,6 @@ class InstantErrors:
     def known(self) -> bool:
         """Whether all instants are those in the log."""
         return not any((self.velocity_s, self.heading_s, self.yaw_rate_s, self.rudder_s, self.smoothing_s))
-
-    @property
-    def row_s(self) -> float:
-        """Length of a row in which an instrument measured somewhere, by the largest error; 0 where all are known."""
-        return sqrt(12.0) * max(self.velocity_s, self.heading_s, self.yaw_rate_s, self.rudder_s)
 
 
 #: of a log in which every reading has its instant

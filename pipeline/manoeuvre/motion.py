@@ -10,7 +10,6 @@ import numpy as np
 
 from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.manoeuvre.helm import DEAD_TIME, pass_through
-from kempf.pipeline.model.batch import ONE
 from kempf.pipeline.model.chain import PSI, F, R, V
 from kempf.pipeline.model.dynamics import CHANNEL, N_BEFORE, N_INPUT, SPEED, dynamics, room_of
 from kempf.schemas.symbols import SYMBOLS
@@ -69,7 +68,8 @@ def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
     away = numbers[WIND_FROM] - x[PSI, 0]
     ahead, abeam = numbers[WIND] * np.cos(away) + s[0], numbers[WIND] * np.sin(away) + x[V, 0]
     row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
-    dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, fx, J, ONE)
+    # a number as the filters give it: a constant is of a type of its own, for which all of it would be compiled again
+    dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, fx, J, (np.int64(1),))
     length, settled = numbers[LENGTH], numbers[SETTLED]
     fs[0] = (
         (_kept(numbers, s[0], x[V, 0], x[R, 0], rudder[0], x[PSI, 0]) - s[0])
@@ -266,7 +266,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, air, ph
     )
     x, xn, s, sn = np.zeros(shape), np.zeros(shape), np.zeros(4), np.zeros(4)
     rest = np.zeros(2 + extra)
-    _, at_rest = balanced(numbers, hull, effects, day, table, extra, 0.0, True, rest)  # noqa: FBT003 - compiled
+    _, at_rest = balanced(numbers, hull, effects, day, table, extra, 0.0, np.bool_(1), rest)
     if not at_rest:
         rest[:] = 0.0
     straight = rest[1]
@@ -283,12 +283,12 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, air, ph
     past = np.zeros((2 * m, track.shape[0] if np.any(kinds == DEAD_TIME) else 1))
     past[1::2, 0] = reading
     gear = (kinds, sizes, out, np.zeros(m), gone, past, np.zeros(3))
-    begun, t, n = reading, 0.0, 1
+    begun, t, n = reading, 0.0, np.int64(1)
     room[8][0] = reading
     rates(x, s, room[8], sea, numbers, room[0], room[4])
     _record(track[0], t, x, s, reading, sea)
     limit, V0, scale = numbers[RUDDER_RATE], numbers[APPROACH], numbers[SCALE]
-    numbers, row_of_air = numbers.copy(), 0
+    numbers, row_of_air = numbers.copy(), np.int64(0)
     for k in range(phases.shape[0]):
         order, side, target, longest = phases[k]
         if np.isnan(order):

@@ -80,4 +80,5 @@ def _sampled(A: Float, W: Float, step_s: float) -> tuple[Float, Float]:
     exponential = expm(step_s * block)
     Phi = exponential[:, size:, size:].transpose(0, 2, 1)
     Q = Phi @ exponential[:, :size, size:]
-    return Phi, 0.5 * (Q + Q.transpose(0, 2, 1))
+    # in order, as the other systems have it: what is laid out otherwise would be compiled for once more
+    return np.ascontiguousarray(Phi), 0.5 * (Q + Q.transpose(0, 2, 1))

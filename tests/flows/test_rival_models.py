@@ -142,3 +142,24 @@ def test_what_diagnoses_of_it_or_of_less_say_against_a_model(
     against = rival_models.rivals_of(warehouse, own).against
     assert len(against) == bool(says)
     assert all(sentence.startswith(says) for sentence in against)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "more", "said"),
+    [
+        ("adequate", {}, ()),
+        ("unexplained", {}, ("dx-1 says unexplained: what no known effect explains is in no interval",)),
+        (
+            *("insufficient_data", {"unresolved": {"channel": "rudder"}}),
+            ("dx-1 says that readings are too far apart: what the model may lack is in no interval",),
+        ),
+    ],
+)
+def test_what_a_diagnosis_leaves_is_said_against_the_model(
+    tmp_path: Path, verdict: str, more: dict[str, Any], said: tuple[str, ...]
+) -> None:
+    warehouse, own = Warehouse(str(tmp_path / "w")), of_model(())
+    parameter_sets.insert(warehouse, [own])
+    about = ("dx-1", own.vessel, own.parameter_set_id, own.start_utc_ns, verdict, ())
+    assert diagnoses.insert(warehouse, StoredDiagnosis(*about, {"sets": [], **more}, own.provenance["inputs"], "c0de"))
+    assert rival_models.rivals_of(warehouse, own).against == said

@@ -36,7 +36,7 @@ def bucket(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bucket]:
     from pyarrow import fs
 
     port, log = free_port(), tmp_path_factory.mktemp("s3") / "log"
-    command = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+    command = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
     with running(command, environment(), log, port=port):
         settings = {**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"}
         store = fs.S3FileSystem(

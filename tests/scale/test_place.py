@@ -80,7 +80,7 @@ def place(built: Image, installed: dict[Path, int], ferry: Ship) -> Iterator[Pla
         quick = {"PREFECT_WORKER_QUERY_SECONDS": "1", "PREFECT_RUNNER_POLL_FREQUENCY": "1"}  # the tests wait less
         made = Place(built, known, stack, quick)
         port, log = made.ports["9000"], built.root / "s3.log"
-        server = [sys.executable, "-m", "moto.server", "-H", "127.0.0.1", "-p", str(port)]
+        server = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
         stack.enter_context(running(server, environment(), log, port=port))
         made.logs["s3"] = [log]
         for name in order.static_order():

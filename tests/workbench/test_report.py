@@ -141,7 +141,8 @@ def as_verdict(verdict: str, stored: Mapping[str, Any], evidence: DiagnosisEvide
             "sentences": [f"First-order rudder lag {NOT_EXPLAINED}."],
         }, evidence
     if verdict == "insufficient_data":
-        return {**content, "sentences": ["One manoeuvre alone cannot distinguish an effect from chance."]}, evidence
+        few = ["One manoeuvre alone cannot distinguish an effect from chance."]
+        return {**content, "sentences": few, "too_few_manoeuvres": True}, evidence
     candidates = [{**one, "verdict": "absent", "why": "no sign of it"} for one in content["candidates"]]
     manoeuvres = tuple(one.model_copy(update={"after": None}) for one in evidence.manoeuvres)
     plain = {"models": evidence.models[:1], "manoeuvres": manoeuvres, "unmodelled_after": None}
@@ -185,6 +186,26 @@ def test_every_word_agrees_with_the_verdict(
     assert ("model with effects tried" in text) is (verdict in ("unexplained", "insufficient_data"))
     for name, words in wording.sections.items():
         assert f'<a href="#{name}">' in html and words.title in text
+
+
+def test_readings_too_far_apart_have_advice_of_their_own(report: MadeReport, stored: Mapping[str, Any]) -> None:
+    content, evidence = as_verdict("insufficient_data", stored, report.content.evidence)
+    apart = {
+        "channel": "rudder",
+        "period_s": 1.0,
+        "length_s": 1.7,
+        "needed": "Log rudder and heading at 6 Hz or faster.",
+    }
+    alone = wording_of("late", {**content, "unresolved": apart, "too_few_manoeuvres": False}, evidence)
+    assert alone.headline == "Not decided: the rudder is read too seldom for so quick a ship."
+    assert alone.next_steps[0] == apart["needed"] and not any("three zigzags" in step for step in alone.next_steps)
+    both = wording_of("late", {**content, "unresolved": apart, "too_few_manoeuvres": True}, evidence)
+    assert "too few manoeuvres to distinguish an effect from chance and the rudder is read" in both.headline
+    assert "three zigzags" in both.next_steps[1]
+    claimed, evidence = as_verdict("partly_explained", stored, report.content.evidence)
+    rest = wording_of("late", {**claimed, "unresolved": apart}, evidence)
+    assert rest.headline.endswith("; what else is missing cannot be tested, as the rudder is read too seldom.")
+    assert not any("term of your own" in step for step in rest.next_steps)
 
 
 def test_what_the_model_has_already_is_not_advised(report: MadeReport, stored: Mapping[str, Any]):

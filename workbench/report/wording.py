@@ -106,15 +106,35 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str, has: Sequenc
     titles = _titles(content)
     effects = " and ".join(" or ".join(titles[name] for name in group["effects"]) for group in content["sets"])
     return {
-        "insufficient_data": "Not decided: too few manoeuvres to distinguish an effect from chance.",
+        "insufficient_data": f"Not decided: {_undecided(content)}.",
         "adequate": f"The {first} is adequate: no effect that was tried predicts unfitted manoeuvres better.",
         "explained": f"The {first} lacks {effects}{_share(content)}; beside it nothing stands out from noise.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
-        "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
+        "partly_explained": f"The {first} lacks {effects}{_share(content)}; {_beside(content)}.",
         "unexplained": f"{_share_before(content, has)} a systematic misfit remains that no known effect accounts for."
         if has
         else f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
     }[verdict]
+
+
+def _undecided(content: Mapping[str, Any]) -> str:
+    """Return why nothing is decided, a phrase."""
+    few = ["too few manoeuvres to distinguish an effect from chance"] if _too_few(content) else []
+    apart = content.get("unresolved")
+    return " and ".join([*few, *([f"the {apart['channel']} is read too seldom for so quick a ship"] if apart else [])])
+
+
+def _too_few(content: Mapping[str, Any]) -> bool:
+    """Return whether manoeuvres are too few; a diagnosis of earlier code says so by its verdict alone."""
+    return bool(content.get("too_few_manoeuvres", content["verdict"] == "insufficient_data"))
+
+
+def _beside(content: Mapping[str, Any]) -> str:
+    """Return what is beside the effects that explain a part."""
+    apart = content.get("unresolved")
+    if apart:
+        return f"what else is missing cannot be tested, as the {apart['channel']} is read too seldom"
+    return "something else remains beside it"
 
 
 def _share_before(content: Mapping[str, Any], has: Sequence[str]) -> str:
@@ -135,9 +155,12 @@ def _next_steps(
     vessel: str, verdict: str, content: Mapping[str, Any], evidence: DiagnosisEvidence, included: Collection[str]
 ) -> list[str]:
     name, titles, steps = quote(vessel), _titles(content), []
-    if verdict == "insufficient_data":
+    apart = content.get("unresolved")
+    if apart:
+        steps.append(apart["needed"])
+    if verdict == "insufficient_data" and _too_few(content):
         steps.append("Sail at least three zigzags, to both sides, at two rudder angles and on two headings.")
-    if verdict in ("unexplained", "partly_explained"):
+    if verdict in ("unexplained", "partly_explained") and not apart:
         steps.append(
             "See where the misfit remains: one-step errors, correlations and unmodelled acceleration below. Then try a "
             f'term of your own: kempf effects try "yaw: r*abs(r)" --vessel {name}.'

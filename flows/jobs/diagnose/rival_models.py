@@ -97,6 +97,9 @@ def _against(found: Sequence[StoredDiagnosis], effects: Sequence[str]) -> tuple[
             f"{listed(list(dict.fromkeys(missing.values())))} found that the model lacks {listed(list(missing))}: that "
             "is in no interval of this set until it is added to the model",
         )
+    apart = [d.diagnosis_id for d in of_less if d.content.get("unresolved")]
+    if apart:
+        return (f"{max(apart)} says that readings are too far apart: what the model may lack is in no interval",)
     left = [d for d in of_less if d.verdict in _LEFT]
     if not left:
         return ()

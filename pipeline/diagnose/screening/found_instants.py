@@ -11,6 +11,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field
 
 from kempf.pipeline.channels.found_instants import FoundInstants
+from kempf.pipeline.diagnose.screening.resolution import unresolved
 from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.diagnose.split import split
@@ -27,8 +28,6 @@ LayOut = Callable[[Mapping[int, FoundInstants]], Sequence[GridRun]]
 
 #: twice the log-likelihood above which runs are laid out anew: of less no test of a model is aware; and how often
 _SEEN, _MOST = 6.0, 3
-#: rows as a share of the time in which the yaw rate settles, from which they are too slow for a ship
-_SLOW = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +50,7 @@ def at_found_instants(
 
     An instrument that is farther off than its rows allow is late itself, or the rudder is, and a diagnosis is to find
     it: then all instants stay as they are taken. They do so, too, of a log of which every manoeuvre is held out, of a
-    ship that is as quick as her rows, and where a manoeuvre could not be used at the instants that are found.
+    ship that is too quick for her readings, and where a manoeuvre could not be used at the instants that are found.
 
     Parameters
     ----------
@@ -66,7 +65,7 @@ def at_found_instants(
     listener : Listener, optional
         Notified of what is fitted.
     """
-    if _too_slow(as_taken):
+    if unresolved(as_taken.runs) is not None:
         return as_taken
     made = as_taken
     for _ in range(_MOST):
@@ -111,12 +110,3 @@ def fitted_runs(
     chosen, _ = split(runs)
     plain, fits = staged([runs[i] for i in chosen], spec, effects, workers, listener=listener)
     return FittedRuns(tuple(runs), plain, tuple(fits), found or {})
-
-
-def _too_slow(made: FittedRuns) -> bool:
-    """Return whether a ship is about as quick as the rows of a log: her motion between them is not resolved.
-
-    By eq. (16) her yaw rate settles within 1 / (|a22| V).
-    """
-    rate_per_m = abs(float(made.fits[0].hull[3]))
-    return any(run.instant_errors.row_s * rate_per_m * run.approach_m_s > _SLOW for run in made.runs)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 from kempf.pipeline.channels.found_instants import FoundInstants
 from kempf.pipeline.diagnose.screening.found_instants import FittedRuns, LayOut, at_found_instants, fitted_runs
+from kempf.pipeline.diagnose.screening.resolution import MAY_IMITATE, Unresolved, unresolved
 from kempf.pipeline.diagnose.screening.ridge_reference import RidgeReference, ridge_reference_of
 from kempf.pipeline.diagnose.screening.screen import screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
@@ -50,11 +51,13 @@ class Diagnosis:
     #: By name, how large the effects of ``steps`` are in the last of these; and what else is in their sets, in place of
     #: them.
     sizes: Mapping[str, Size]
-    #: Steps after them whose effects only the likelihood chose, while something that no effect explains is left: they
-    #: improve the fit and may imitate it.
+    #: Steps after them whose effects only the likelihood chose, while something that no effect explains is left, or
+    #: readings do not resolve her motion: they improve the fit and may imitate that.
     imitating: tuple[Step, ...]
     #: Whether something is left that the catalogue does not name.
     something_left: bool
+    #: Which readings are too far apart for such a ship; None where they resolve her motion.
+    unresolved: Unresolved | None
     #: before, after: The flexible reference beside the plain model and beside the last; None with a single run.
     before: RidgeReference | None
     after: RidgeReference | None
@@ -129,7 +132,8 @@ def diagnose(
     if before is not None and ladder.probe is not base:
         after = ridge_reference_of(ladder.probe, workers)
     left = something_left(steps, before, after)
-    kept = _claimed(steps) if left else len(steps)
+    too_far = unresolved(made.runs)
+    kept = _claimed(steps) if left or too_far is not None else len(steps)
     ahead = steps[kept - 1].ahead
     listener.begins("sizing what was found")
     claimed = without_members(steps[:kept])
@@ -141,10 +145,11 @@ def diagnose(
         sizes=sizes,
         imitating=tuple(steps[kept:]),
         something_left=left,
+        unresolved=too_far,
         before=before,
         after=after,
-        immaterial=tuple(findings.immaterial),
-        suspected=findings.suspected,
+        immaterial=() if too_far else tuple(findings.immaterial),
+        suspected={**findings.suspected, **_imitating(findings.immaterial)} if too_far else findings.suspected,
         remaining=None if ahead is None else remaining_misfit(ahead, workers),
         fitted=tuple(filtered.run for filtered in base.runs),
         held=tuple(held),
@@ -155,8 +160,13 @@ def diagnose(
     )
 
 
+def _imitating(immaterial: Sequence[Immaterial]) -> dict[str, str]:
+    """Return why effects that are certain by their likelihood are not, where readings are too far apart, by name."""
+    return {candidate.effect.name: MAY_IMITATE for one in immaterial for candidate, _ in one.chosen_from}
+
+
 def _claimed(steps: Sequence[Step]) -> int:
-    """Return how many steps are claimed though something is left: those that predictions of legs chose.
+    """Return how many steps are claimed though something else may be there: those that predictions of legs chose.
 
     What was chosen by its prediction of manoeuvres left out, and by every repetition without one of them, is there
     though something else may be missing too; what only the likelihood sees may imitate that.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 from kempf.pipeline.channels.series import Float
@@ -13,7 +14,7 @@ from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.verdicts.effect_finding import climbed, finding, improves_the_fit, refusal
 from kempf.pipeline.diagnose.verdicts.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.verdicts.sentences import sentences
-from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, verdict
+from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, too_few, verdict
 from kempf.schemas.effect import Effect
 
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -70,6 +71,10 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 ],
             },
         },
+        "too_few_manoeuvres": too_few(diagnosis),
+        "unresolved": None
+        if diagnosis.unresolved is None
+        else {**asdict(diagnosis.unresolved), "needed": diagnosis.unresolved.needed},
         "fitted": [run.name for run in diagnosis.fitted],
         "held_out": [run.name for run in diagnosis.held],
         "gross_errors": diagnosis.plain.gross_errors,

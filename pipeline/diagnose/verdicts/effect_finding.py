@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from kempf.pipeline.diagnose.screening.resolution import MAY_IMITATE
 from kempf.pipeline.diagnose.screening.screen import Candidate
 from kempf.pipeline.diagnose.steps.confirm import BIC_SAVING, Confirmation, unpredicted
 from kempf.pipeline.diagnose.steps.immaterial import Immaterial
@@ -88,8 +89,13 @@ def improves_the_fit(diagnosis: Diagnosis) -> dict[str, str]:
     why: dict[str, str] = {}
     for step in diagnosis.imitating:
         for member, confirmation in step.chosen_from:
-            why.setdefault(member.effect.name, f"{NOT_EXPLAINED}: {sized_by_refit(member.effect, confirmation)}")
+            why.setdefault(member.effect.name, f"{imitates(diagnosis)}: {sized_by_refit(member.effect, confirmation)}")
     return why
+
+
+def imitates(diagnosis: Diagnosis) -> str:
+    """Say why effects that improve the fit alone are not claimed."""
+    return NOT_EXPLAINED if diagnosis.unresolved is None else MAY_IMITATE
 
 
 def changes(immaterial: Immaterial) -> str:

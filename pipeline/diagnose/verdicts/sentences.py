@@ -11,11 +11,11 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.steps.immaterial import LEAST_PART, LEAST_SHIFT, weighed
 from kempf.pipeline.diagnose.steps.ladder_step import Step
 from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
-from kempf.pipeline.diagnose.verdicts.effect_finding import NOT_EXPLAINED, changes
+from kempf.pipeline.diagnose.verdicts.effect_finding import changes, imitates
 from kempf.pipeline.diagnose.verdicts.remainder import reference_gains
 from kempf.pipeline.diagnose.verdicts.remaining_misfit import said as remaining_said
 from kempf.pipeline.diagnose.verdicts.sizes import sized_by_refit, stated
-from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, verdict
+from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, too_few, verdict
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.median_error import LEFT_THE_COURSE, median_error
 from kempf.pipeline.shooting.ahead import Ahead
@@ -60,18 +60,19 @@ def _findings(diagnosis: Diagnosis) -> list[str]:
     if len(diagnosis.steps) > 1:
         lines += _ahead(diagnosis)
         lines.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+    lines += _unresolved(diagnosis)
     if outcome == "insufficient_data":
-        return [*lines, _too_few(diagnosis)]
+        return [*lines, *_too_few(diagnosis)]
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
         size = sized_by_refit(candidate.effect, best)
-        lines.append(f"{at_the_beginning(size)}: {NOT_EXPLAINED}.")
+        lines.append(f"{at_the_beginning(size)}: {imitates(diagnosis)}.")
     for immaterial in diagnosis.immaterial:
         (candidate, best), *_ = immaterial.chosen_from
         lines.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(immaterial)}.")
     if outcome == "adequate":
         lines.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
-    if diagnosis.something_left and diagnosis.after is not None:
+    if diagnosis.something_left and diagnosis.after is not None and diagnosis.unresolved is None:
         if outcome == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
             lines.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
@@ -91,13 +92,27 @@ def _findings(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def _too_few(diagnosis: Diagnosis) -> str:
+def _too_few(diagnosis: Diagnosis) -> list[str]:
+    if not too_few(diagnosis):
+        return []
     few = (
         "One manoeuvre alone cannot distinguish an effect from chance"
         if diagnosis.before is None
         else "Two manoeuvres are too few to choose an effect by its predictions"
     )
-    return f"{few}: sail at least three zigzags, to both sides, at two rudder angles, on two headings."
+    return [f"{few}: sail at least three zigzags, to both sides, at two rudder angles, on two headings."]
+
+
+def _unresolved(diagnosis: Diagnosis) -> list[str]:
+    """Say that readings are too far apart for such a ship."""
+    found = diagnosis.unresolved
+    if found is None:
+        return []
+    what = "What she lacks" if len(diagnosis.steps) == 1 else "What else she lacks"
+    return [
+        f"{what} cannot be tested with these data: {found.says}. What she does between two readings is not recorded, "
+        f"and a misfit that this leaves is no sign of missing physics. {found.needed}"
+    ]
 
 
 def _given(diagnosis: Diagnosis) -> list[str]:
@@ -179,14 +194,15 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     ]
     share = share_explained(diagnosis)
     if share is not None:
-        seen = diagnosis.something_left or last.disagrees is not None or diagnosis.immaterial or diagnosis.suspected
-        rest = "" if seen else _REST
+        doubtful = last.disagrees is not None or diagnosis.unresolved is not None
+        seen = diagnosis.something_left or diagnosis.immaterial or diagnosis.suspected
+        rest = "" if seen or doubtful else _REST
         explained = f"{100.0 * share:.0f} %" if share >= _LEAST_SHARE else "nothing"
         lines.append(
             f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {explained} is explained{rest}."
         )
     lines += _left(diagnosis)
-    return lines + _disagreement(last, "still ")
+    return lines if diagnosis.unresolved is not None else lines + _disagreement(last, "still ")
 
 
 def _disagreement(model: Ahead | None, still: str) -> list[str]:

@@ -15,10 +15,10 @@ Verdict = Literal["adequate", "explained", "ambiguous", "partly_explained", "une
 def verdict(diagnosis: Diagnosis) -> Verdict:
     """Return what the diagnosis comes to."""
     nothing_claimed = len(diagnosis.steps) == 1
-    if diagnosis.before is None or (nothing_claimed and len(diagnosis.fitted) + len(diagnosis.held) < FEWEST):
-        # of two manoeuvres predictions do not choose, so that nothing is known of most effects
+    # what readings too far apart leave of a misfit is not the model's
+    if too_few(diagnosis) or (nothing_claimed and diagnosis.unresolved is not None):
         return "insufficient_data"
-    if diagnosis.something_left:
+    if diagnosis.something_left or diagnosis.unresolved is not None:
         return "unexplained" if nothing_claimed else "partly_explained"
     sizes = [len(step.chosen_from) for step in diagnosis.steps[1:]]
     last = diagnosis.steps[-1].ahead
@@ -28,6 +28,15 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
     if nothing_claimed:
         return "adequate"
     return "explained" if max(sizes) == 1 else "ambiguous"
+
+
+def too_few(diagnosis: Diagnosis) -> bool:
+    """Return whether there are too few manoeuvres for a verdict.
+
+    Of two manoeuvres predictions do not choose, so that nothing is known of most effects that are not claimed.
+    """
+    few = len(diagnosis.fitted) + len(diagnosis.held) < FEWEST
+    return diagnosis.before is None or (few and len(diagnosis.steps) == 1)
 
 
 def share_explained(diagnosis: Diagnosis) -> float | None:

@@ -103,6 +103,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         measured=measured,
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         rudder_period_s=rudder.period_s,
+        heading_period_s=heading.period_s,
         rudder_noise_rad_sqrt_s=np.full(instants.size, rudder_std * float(np.sqrt(rudder.period_s))),
         speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), slow.error_std, slow.error_time_s),
         speed_readings=_readings(log, mean_s, instants),

@@ -84,6 +84,9 @@ class GridRun:
     speed_readings: SpeedReadings
     #: See `kempf.pipeline.estimate.record.record.Record`.
     instant_errors: InstantErrors = IN_THE_LOG
+    #: rudder_period_s, heading_period_s: Median time between readings, s: what she does in between is a guess.
+    rudder_period_s: float = 0.0
+    heading_period_s: float = 0.0
     #: Shape (n,). Of the means of the lateral speed, see `kempf.pipeline.estimate.record.record.Record`.
     lateral_by_late: Float | None = None
     #: See `kempf.pipeline.estimate.record.loads`.
@@ -312,6 +315,8 @@ def make_run(
         speed_readings=readings_averaged(record.speed_readings, step_s, n),
         load=load,
         instant_errors=record.instant_errors,
+        rudder_period_s=record.rudder_period_s,
+        heading_period_s=record.heading_period_s,
         lateral_by_late=None if by_late is None else cell_means(record.time_s, by_late, step_s, n)[0],
     )
 

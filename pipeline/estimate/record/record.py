@@ -66,6 +66,8 @@ class Record(Instants):
     speed_readings: SpeedReadings
     #: Median time between readings of the rudder; in between its course is a guess, a straight line.
     rudder_period_s: float
+    #: The same of the heading, which eq. (18) interpolates to the readings of the velocity.
+    heading_period_s: float
     #: Eq. (18) with its standard errors.
     lateral: LateralSpeed
     warnings: tuple[str, ...]
