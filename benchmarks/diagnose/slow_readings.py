@@ -30,9 +30,10 @@ from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
 from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.units import DAY_NS
 from kempf.warehouse.storage.store import Warehouse
 
-_HULL, _DAY_NS, _RATES_HZ, _BASE_HZ = "usv", 86_400_000_000_000, (1.0, 2.0, 5.0, 10.0), 10.0
+_HULL, _RATES_HZ, _BASE_HZ = "usv", (1.0, 2.0, 5.0, 10.0), 10.0
 #: which instruments have the rate; the others have ten readings a second; none: rows of a table, all of it
 _SLOW: dict[str, tuple[str, ...]] = {
     "every instrument": ("gnss", "heading", "yaw_rate", "rudder", "log", "wind", "shaft", "depth", "roll"),
@@ -75,7 +76,7 @@ def _settings(case: _Case, day: int) -> TrialSettings:
         first,
         programme=(*first.programme, *second.programme),
         instruments=instruments,
-        start_utc_ns=first.start_utc_ns + day * _DAY_NS,
+        start_utc_ns=first.start_utc_ns + day * DAY_NS,
         heading_deg=90.0 * day,
     )
 
@@ -93,10 +94,8 @@ def _outcomes(case: _Case) -> tuple[str, str]:
         for day in (0, 1):
             trial = simulate_trial(_settings(case, day))
             ending, data = _log_of(case, trial)
-            ingest_log(
-                *(warehouse, _HULL, f"day{day}.{ending}", LogFile(data), logger_profile(trial.settings)),
-                _HULL,
-            )
+            profile = logger_profile(trial.settings)
+            ingest_log(warehouse, _HULL, f"day{day}.{ending}", LogFile(data), profile, _HULL)
         layout = layout_of(warehouse, choose(warehouse, _HULL), ModelSpec())
         runs = layout.runs()
         found = diagnose(runs.runs, runs.spec, catalogue(), workers, lay_out=layout.runs_at)
@@ -158,7 +157,7 @@ def _measured(data: Path) -> list[list[str]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=result_page.DATA)
-    parser.add_argument("--cases", type=int, default=6, help="of every rate")
+    parser.add_argument("--cases", type=int, default=2, help="of every rate")
     given = parser.parse_args()
     head = [f"{when}: {one}" for when in ("before", "now") for one in ("not testable", *_OUTCOMES[1:], "a claim")]
     lines = [

@@ -6,7 +6,6 @@ import multiprocessing
 import os
 import pkgutil
 import shutil
-import sys
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from benchmarks.fleet.kill_dask import WORKERS, Mortal
 from benchmarks.fleet.torn_jobs import BEGINS, work
 from kempf.warehouse.storage.store import Warehouse
 from tests.scale.conftest import KEYS
-from tests.scale.servers import environment, free_port, running
+from tests.scale.servers import environment, free_port, running, s3_server
 
 _SERVER = multiprocessing.get_context("forkserver")
 
@@ -112,9 +111,8 @@ class Bucket(Place):
         from pyarrow import fs
 
         port = free_port()
-        command = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
         folder.mkdir(parents=True, exist_ok=True)
-        stack.enter_context(running(command, environment(), folder / "server.log", port=port))
+        stack.enter_context(running(s3_server(port), environment(), folder / "server.log", port=port))
         self.settings = {**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"}
         super().__init__(folder, harbour, self.settings)
         self.files = fs.S3FileSystem(

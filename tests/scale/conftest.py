@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import gzip
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,7 +16,7 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.storage.store import Warehouse
 from kempf.warehouse.tables import vessels
 from tests.conftest import Ship
-from tests.scale.servers import environment, free_port, running
+from tests.scale.servers import environment, free_port, running, s3_server
 
 KEYS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing"}
 
@@ -36,8 +35,7 @@ def bucket(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bucket]:
     from pyarrow import fs
 
     port, log = free_port(), tmp_path_factory.mktemp("s3") / "log"
-    command = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
-    with running(command, environment(), log, port=port):
+    with running(s3_server(port), environment(), log, port=port):
         settings = {**KEYS, "AWS_ENDPOINT_URL": f"http://127.0.0.1:{port}"}
         store = fs.S3FileSystem(
             access_key="testing",

@@ -20,6 +20,11 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 
 
+def s3_server(port: int) -> list[str]:
+    """The command that starts an S3 server of the tests' own."""
+    return [sys.executable, "-m", "tests.scale.s3_server", str(port)]
+
+
 def free_port() -> int:
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))

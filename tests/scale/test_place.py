@@ -11,7 +11,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 import time
 import tomllib
 from collections.abc import Iterator
@@ -30,7 +29,7 @@ from tests.conftest import Ship
 from tests.scale import compose, image
 from tests.scale.compose import Place
 from tests.scale.image import Image
-from tests.scale.servers import ROOT, environment, running, wait_for
+from tests.scale.servers import ROOT, environment, running, s3_server, wait_for
 
 DEPLOY = ROOT / "deploy"
 #: Services that are not Kempf's own: the tests have an S3 server of their own, and DuckDB in place of Grafana.
@@ -80,8 +79,7 @@ def place(built: Image, installed: dict[Path, int], ferry: Ship) -> Iterator[Pla
         quick = {"PREFECT_WORKER_QUERY_SECONDS": "1", "PREFECT_RUNNER_POLL_FREQUENCY": "1"}  # the tests wait less
         made = Place(built, known, stack, quick)
         port, log = made.ports["9000"], built.root / "s3.log"
-        server = [sys.executable, "-m", "tests.scale.s3_server", str(port)]
-        stack.enter_context(running(server, environment(), log, port=port))
+        stack.enter_context(running(s3_server(port), environment(), log, port=port))
         made.logs["s3"] = [log]
         for name in order.static_order():
             if name not in (*OTHERS, "tables"):
