@@ -3,9 +3,10 @@
 Score (Lagrange multiplier) statistic of each candidate with all fitted parameters as nuisance: with the candidate's
 columns S of the whitened innovations and S' = (I - P_0) S what the fitted ones cannot imitate, LM = e'S'(S'S')^-1 S'e,
 chi-squared with as many degrees of freedom as the candidate has parameters, and the expected parameter change
-(S'S')^-1 S'e. Reference: Breusch & Pagan (1980), "The Lagrange multiplier test and its applications to model
-specification in econometrics", Review of Economic Studies 47; Saris, Satorra & Sorbom (1987), "The detection and
-correction of specification errors in structural equation models", Sociological Methodology 17.
+(S'S')^-1 S'e. Both S and e are taken beside a loss of speed that the logs do not show
+(`kempf.pipeline.diagnose.screening.speed_lost`). Reference: Breusch & Pagan (1980), "The Lagrange multiplier test and
+its applications to model specification in econometrics", Review of Economic Studies 47; Saris, Satorra & Sorbom (1987),
+"The detection and correction of specification errors in structural equation models", Sociological Methodology 17.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from kempf.pipeline.diagnose.screening.effect_score import (
     solved,
 )
 from kempf.pipeline.diagnose.screening.nuisance import Nuisance, nuisance
+from kempf.pipeline.diagnose.screening.speed_lost import SpeedLost, speed_lost
 from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -52,7 +54,8 @@ class Candidate:
     absorption: float
     #: Channels it needs that the runs lack.
     missing: tuple[str, ...]
-    #: Shape (N,). S' times the change: what the effect would explain of the whitened innovations.
+    #: Shape (N,). S' times the change: what the effect would explain of the whitened innovations; its product with
+    #: these is the score.
     direction: Float
     #: Where on its grid it was tried.
     steps: tuple[float, ...]
@@ -78,8 +81,7 @@ def screen(
     """
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]
-    known = nuisance(base.linearised, N_HULL + len(base.model.names))
-    scored = _scored(base, known, chosen, workers, listener)
+    scored = _scored(base, chosen, workers, listener)
     raised = adjusted([candidate.p_value for candidate in scored])
     scored = [replace(candidate, p_adjusted=p) for candidate, p in zip(scored, raised, strict=True)]
     return sorted(scored, key=lambda candidate: (-np.nan_to_num(candidate.score, nan=-1.0), candidate.effect.name))
@@ -87,12 +89,12 @@ def screen(
 
 def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
     """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
-    (candidate,) = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), [effect], workers)
+    (candidate,) = _scored(base, [effect], workers)
     return replace(candidate, p_adjusted=candidate.p_value)
 
 
 def _scored(
-    base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor, listener: Listener = SILENT
+    base: PooledFit, effects: Sequence[Effect], workers: Executor, listener: Listener = SILENT
 ) -> list[Candidate]:
     nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would imitate something else
@@ -100,7 +102,9 @@ def _scored(
     trials = [EffectTrial(effect, steps) for effect in tried for steps in grid(effect)]
     columns = responses(base, trials, workers, listener)
     moved = {(trial.effect.name, trial.steps): column for trial, column in zip(trials, columns, strict=True)}
-    return list(workers.map(lambda candidate: _best(known, candidate, moved), nothing))
+    lost = speed_lost(base, workers)
+    known = nuisance(lost.lines(base.linearised), N_HULL + len(base.model.names))
+    return list(workers.map(lambda candidate: _best(known, lost, candidate, moved), nothing))
 
 
 def _untested(base: PooledFit, effect: Effect) -> Candidate:
@@ -110,7 +114,7 @@ def _untested(base: PooledFit, effect: Effect) -> Candidate:
 
 
 def _best(
-    known: Nuisance, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
+    known: Nuisance, lost: SpeedLost, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
 ) -> Candidate:
     """Return an effect at the point of its grid where it explains most, or untested where there is none."""
     best, tries = nothing, 0
@@ -119,14 +123,15 @@ def _best(
         if columns is None:
             continue
         tries += 1
-        tested = _tested(known, columns, nothing.effect, steps)
+        tested = _tested(known, lost, columns, nothing.effect, steps)
         if best is nothing or tested.p_value < best.p_value or np.isnan(best.score):
             best = tested
     # the largest of several tries is larger than any one of them: Bonferroni
     return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
 
 
-def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
+def _tested(known: Nuisance, lost: SpeedLost, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
+    columns = lost.beside(columns)
     clean = known.clean(columns)
     before, after = float(np.sum(columns**2)), float(np.sum(clean**2))
     absorption = 1.0 - after / before if before > 0.0 else 1.0
@@ -143,6 +148,6 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
         std=solution.std,
         absorption=absorption,
         missing=(),
-        direction=clean @ solution.estimate,
+        direction=lost.beside(clean @ solution.estimate),
         steps=steps,
     )
