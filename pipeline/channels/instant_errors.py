@@ -26,6 +26,8 @@ class InstantErrors:
     smoothing_s: float = 0.0
     #: What has been found of the others, and was taken out of the instants.
     found: FoundInstants = AS_TAKEN
+    #: Time between the rows of a table, s, see `kempf.pipeline.channels.instruments.Instruments`.
+    row_s: float = 0.0
 
     @property
     def known(self) -> bool:
@@ -38,7 +40,7 @@ IN_THE_LOG = InstantErrors()
 
 
 def instant_errors(
-    instant_std_s: Mapping[str, float], late_std_s: float, found: FoundInstants = AS_TAKEN
+    instant_std_s: Mapping[str, float], late_std_s: float, found: FoundInstants = AS_TAKEN, row_s: float = 0.0
 ) -> InstantErrors:
     """Return the errors of the instants of one log.
 
@@ -50,10 +52,12 @@ def instant_errors(
         Standard error of the lateness of a smoothed velocity, s.
     found : FoundInstants, optional
         What was taken out of the instants.
+    row_s : float, optional
+        Time between the rows of a table, s; 0 of messages.
     """
     velocity = max(instant_std_s.get(name, 0.0) for name in VELOCITY)
     heading, yaw_rate, rudder = (instant_std_s.get(name, 0.0) for name in OTHERS)
-    return InstantErrors(velocity, heading, yaw_rate, rudder, late_std_s, found)
+    return InstantErrors(velocity, heading, yaw_rate, rudder, late_std_s, found, row_s)
 
 
 def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:

@@ -63,6 +63,8 @@ class Instruments:
     #: Instants, UTC ns, of the readings of a channel that were left out, see
     #: `kempf.pipeline.channels.there_and_back.leaps`.
     left_out: dict[str, Nanoseconds] = field(default_factory=dict)
+    #: Time between the rows of a table that its instruments fill, s; 0 of messages, which have stamps of their own.
+    row_s: float = 0.0
     #: What was taken out of the instants of the log.
     found: FoundInstants = AS_TAKEN
 
@@ -139,7 +141,8 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)
-    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure, left_out)
+    row_s = table.apart_s if table.fresh and table.apart_s < inf else 0.0
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure, left_out, row_s)
 
 
 @dataclass

@@ -93,7 +93,7 @@ def undelayed_speeds(instruments: Instruments, start_utc_ns: int, end_utc_ns: in
         changed["speed_through_water"], mean_s = apart(log, many), many * log.period_s
         sentences.append(f"the speed log shows means over {mean_s:.2g} s: taken at their middle, one after the other")
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
-    errors = instant_errors(instruments.instant_std_s, late_std_s, instruments.found)
+    errors = instant_errors(instruments.instant_std_s, late_std_s, instruments.found, instruments.row_s)
     return UndelayedSpeeds(whole, (*sentences, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
 
 

@@ -109,6 +109,8 @@ def test_a_much_faster_vtg_comes_before_rmc() -> None:
     slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
     found = from_readings(frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast))))
     assert found.sources["course_over_ground"] == "GPVTG"
+    # messages have stamps of their own
+    assert found.row_s == 0.0
 
 
 def rows(row_s: float, held_rows: int = 1) -> pl.DataFrame:
@@ -143,6 +145,7 @@ def test_rows_as_slow_as_instruments_do_not_show_that_they_repeat_any() -> None:
 def test_fast_rows_that_repeat_nothing_are_the_instants_of_measurement() -> None:
     found = from_readings(rows(0.2))
     assert found.series["heading"].time_utc_ns[0] == START and not found.instant_std_s
+    assert found.row_s == pytest.approx(0.2)
 
 
 def test_a_column_that_is_seldom_filled_makes_no_slow_rows_of_fast_ones() -> None:
@@ -156,6 +159,7 @@ def test_a_column_that_is_seldom_filled_makes_no_slow_rows_of_fast_ones() -> Non
 def test_a_table_of_one_row_has_no_rows_apart() -> None:
     found = from_readings(rows(1.0).head(1))
     assert found.series["heading"].time_utc_ns.tolist() == [START] and not found.instant_std_s
+    assert found.row_s == 0.0
 
 
 def test_rows_that_hold_one_reading_each_have_its_instant() -> None:

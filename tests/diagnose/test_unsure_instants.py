@@ -11,7 +11,8 @@ from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening import unsure_instants
 from kempf.pipeline.diagnose.screening.nuisance import columns_of
-from kempf.pipeline.diagnose.screening.unsure_instants import with_instants, within_rows
+from kempf.pipeline.diagnose.screening.unsure_instants import row_around, with_instants, within_rows
+from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds
@@ -159,6 +160,22 @@ def test_a_latency_of_the_model_is_known_no_better_than_the_instants() -> None:
     effect = get("heading_latency")
     assert within_rows(unsure, effect) == bool(abs(fit.values[-1]) < 12.0**0.5 * LATE_S)
     assert not within_rows(fit, effect) and not within_rows(unsure, get("gyro_latency"))
+
+
+def test_a_latency_of_less_than_a_row_may_be_how_the_table_was_written() -> None:
+    ship = sailed("heading_latency")
+    found = ship.diagnosis(("heading_latency",))
+    effect, (tau,) = get("heading_latency"), found.sizes["heading_latency"].values
+    for row_s, around in ((2.0 * abs(tau), True), (0.5 * abs(tau), False)):
+        table = tuple(replace(run, instant_errors=InstantErrors(row_s=row_s)) for run in found.fitted)
+        said = as_json(replace(found, fitted=table))
+        (claimed,) = said["sets"]
+        assert claimed["within_rows_of_s"] == (row_s if around else None)
+        words = f"rows of {row_s:.2g} s that hold each instrument's last reading can do that by themselves"
+        assert any(words in one for one in said["sentences"]) == around
+        assert row_around(table, get("yaw_quadratic"), 0.0) is None
+    # messages
+    assert row_around(found.fitted, effect, 0.0) is None
 
 
 def _unsure(fit: PooledFit, errors: InstantErrors, days: tuple[int, ...]) -> PooledFit:

@@ -30,6 +30,7 @@ from kempf.pipeline.diagnose.screening.nuisance import columns_of, orthonormal
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.search.climb import pressed
 from kempf.pipeline.estimate.sensitivity import difference
@@ -182,6 +183,22 @@ def within_rows(fit: PooledFit, effect: Effect) -> bool:
     own = (of, "smoothing_s") if of == "velocity_s" else (of,)
     std_s = max(hypot(*(getattr(filtered.run.instant_errors, field) for field in own)) for filtered in fit.runs)
     return bool(abs(fit.values[-1]) < _APART * std_s)
+
+
+def row_around(runs: Sequence[GridRun], effect: Effect, size_s: float) -> float | None:
+    """Return the time between the rows of a table where a latency is smaller; None of any other effect.
+
+    Rows that hold the last reading of each instrument make as much of it, and nothing in them shows that they do.
+
+    Parameters
+    ----------
+    runs : sequence of GridRun
+        The longest time counts; logs of messages have none.
+    size_s : float
+        Of the latency.
+    """
+    row_s = max(run.instant_errors.row_s for run in runs)
+    return row_s if effect.name in _LATE.values() and abs(size_s) < row_s else None
 
 
 @dataclass(frozen=True, eq=False)

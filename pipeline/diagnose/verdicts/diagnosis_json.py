@@ -14,6 +14,7 @@ from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.verdicts.effect_finding import climbed, finding, improves_the_fit, refusal
 from kempf.pipeline.diagnose.verdicts.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.verdicts.sentences import sentences
+from kempf.pipeline.diagnose.verdicts.sizes import row_around_size
 from kempf.pipeline.diagnose.verdicts.verdict import share_explained, share_of_given, too_few, verdict
 from kempf.schemas.effect import Effect
 
@@ -90,6 +91,7 @@ def _set(diagnosis: Diagnosis, name: str, step: Step) -> dict[str, Any]:
         "separated_by": step.chosen_from[0][0].effect.separated_by if len(effects) > 1 else "",
         "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
         "stability": step.stability,
+        "within_rows_of_s": row_around_size(diagnosis, step.chosen_from[0][0].effect),
         "refits": [_refit(c, k, diagnosis.sizes.get(c.effect.name)) for c, k in step.chosen_from],
     }
 

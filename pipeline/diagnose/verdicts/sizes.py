@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.screening.unsure_instants import row_around
 from kempf.pipeline.diagnose.steps.confirm import Confirmation
 from kempf.pipeline.diagnose.steps.final_sizes import Size, refitted_size
 from kempf.pipeline.diagnose.steps.ladder_step import Step
@@ -19,6 +20,20 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     Where parameters fitted to legs predict better than the likelihood's, so do the sizes of effects; those of what
     could be in the place of an effect are then not given.
     """
+    row_s = row_around_size(diagnosis, effect)
+    size = _stated(diagnosis, step, effect)
+    if row_s is None:
+        return size
+    return f"{size}; rows of {row_s:.2g} s that hold each instrument's last reading can do that by themselves"
+
+
+def row_around_size(diagnosis: Diagnosis, effect: Effect) -> float | None:
+    """Return the time between the rows of a table where a latency that is claimed is smaller, s; else None."""
+    size = diagnosis.sizes.get(effect.name)
+    return None if size is None else row_around(diagnosis.fitted, effect, float(size.values[0]))
+
+
+def _stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     ahead = diagnosis.steps[-1].ahead
     if ahead is None or ahead.disagrees is None:
         return sized(effect, diagnosis.sizes[effect.name])
