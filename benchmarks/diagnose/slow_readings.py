@@ -1,8 +1,8 @@
-"""A quick ship without any effect whose rudder and heading are read seldom: what a diagnosis makes of her.
+"""A quick ship without any effect whose instruments are read seldom: what a diagnosis makes of her.
 
 What she does between two readings is not in the logs, and what that leaves of a misfit is no missing physics
-(decision 0112). A boat of 3 m sails two zigzags on each of two days; instruments stamp their readings, or a table has
-rows of as many a second.
+(decision 0112); nor is what goes with the noise of a speed log (decision 0113). A boat of 3 m sails two zigzags on each
+of two days; instruments stamp their readings, or a table has rows of as many a second.
 """
 
 from __future__ import annotations
@@ -17,10 +17,13 @@ from tempfile import TemporaryDirectory
 
 from benchmarks import measured_ships, result_page
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
-from kempf.flows.jobs.identify.vessel_runs import LENGTH_M, layout_of
+from kempf.flows.jobs.identify.vessel_runs import LENGTH_M, VesselRuns, layout_of
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.flows.process.cores import usable
+from kempf.pipeline.diagnose.screening.found_instants import fitted_runs
 from kempf.pipeline.diagnose.screening.resolution import unresolved
+from kempf.pipeline.diagnose.screening.ridge_reference import ridge_reference_of
+from kempf.pipeline.diagnose.screening.speed_noise import speed_noise
 from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.verdicts.verdict import verdict
 from kempf.pipeline.ingest.log_file import LogFile
@@ -42,8 +45,10 @@ _SLOW: dict[str, tuple[str, ...]] = {
     "the rate gyro": ("yaw_rate",),
     "the GNSS": ("gnss",),
     "the log": ("log",),
+    "the log, of three times the noise": ("log",),
     "rows of a table": (),
 }
+_NOISY = {"the log, of three times the noise": 3.0}
 _OUTCOMES = ("insufficient_data", "adequate", "unexplained")
 _CLAIMED = "claimed: "
 
@@ -70,7 +75,16 @@ def _settings(case: _Case, day: int) -> TrialSettings:
     )
     slow = _SLOW[case.slow]
     instruments = tuple(
-        replace(one, rate_hz=case.rate_hz if one.name in slow else _BASE_HZ, jitter_s=0.01) for one in first.instruments
+        replace(
+            one,
+            rate_hz=case.rate_hz if one.name in slow else _BASE_HZ,
+            jitter_s=0.01,
+            noise={
+                what: std * (_NOISY.get(case.slow, 1.0) if one.name == "log" else 1.0)
+                for what, std in one.noise.items()
+            },
+        )
+        for one in first.instruments
     )
     return replace(
         first,
@@ -135,9 +149,10 @@ def _cells(count: Counter[str]) -> list[str]:
     return [*(str(count[one]) for one in _OUTCOMES), "; ".join(claims)]
 
 
-def _measured(data: Path) -> list[list[str]]:
-    """Return how far apart the readings of measured ships are, in times in which they sail their length."""
+def _measured(data: Path) -> tuple[list[list[str]], list[list[str]]]:
+    """Return how far apart the readings of measured ships are, and what the noise of their logs does."""
     ships = dict(measured_ships.every(data))
+    noisy = [[name, *_by_noise(laid_out)] for name, laid_out in ships.items() if len(laid_out.runs) > 1]
     for make in (measured_ships.tank, measured_ships.pond):
         ship = make(data)
         ships[f"{ship.name}, a row a second"] = measured_ships.thinned(ship, 1.0).runs()
@@ -151,7 +166,17 @@ def _measured(data: Path) -> list[list[str]]:
         part = f"{min(shares):.2g} to {max(shares):.2g}" if known else "her length is not known"
         rows.append([name, apart, part, "no" if found else "yes" if known else "taken to be"])
         print(*rows[-1], flush=True)
-    return rows
+    return rows, noisy
+
+
+def _by_noise(laid_out: VesselRuns) -> tuple[str, str]:
+    """Return what the noise of the log does at most in a manoeuvre, and what the flexible reference gains."""
+    with ThreadPoolExecutor(usable()) as workers:
+        fit = fitted_runs(laid_out.runs, laid_out.spec, (), workers).fits[-1]
+        most = max(float(column @ column) for column in speed_noise(fit, workers).columns)
+        gain = ridge_reference_of(fit, workers).gain
+    print(most, gain, flush=True)
+    return f"{most:.2g}", f"{gain:.1f}"
 
 
 def main() -> None:
@@ -160,6 +185,7 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=2, help="of every rate")
     given = parser.parse_args()
     head = [f"{when}: {one}" for when in ("before", "now") for one in ("not testable", *_OUTCOMES[1:], "a claim")]
+    apart, noisy = _measured(given.data)
     lines = [
         f"{given.cases} boats of every kind, none with an effect; the rest of the instruments gives "
         f"{_BASE_HZ:g} readings a second. Before is what a verdict was without regard to the time between readings.",
@@ -174,7 +200,13 @@ def main() -> None:
         "Time between readings of rudder or heading, whichever is longer, and that as a part of the time in which she "
         "sails her length, over the manoeuvres. The trial logs are simulated.",
         "",
-        *result_page.table(["ship", "s between readings", "part of a length", "resolved"], _measured(given.data)),
+        *result_page.table(["ship", "s between readings", "part of a length", "resolved"], apart),
+        "",
+        "What of the speed's changes may be noise of the log: what a standard deviation of that does to the whitened "
+        "innovations of a manoeuvre, squared and summed, in the manoeuvre that has most of it; and the log-likelihood "
+        "that the flexible reference gains beside the plain model, allowing for it.",
+        "",
+        *result_page.table(["ship", "by noise of the log", "reference"], noisy),
     ]
     result_page.write("diagnose.slow_readings", "Readings too far apart for a quick ship", lines)
 

@@ -12,7 +12,7 @@ from math import inf
 import numpy as np
 import polars as pl
 
-from kempf.pipeline.channels.found_instants import AS_TAKEN, FoundInstants
+from kempf.pipeline.channels.found_instants import AS_TAKEN, OTHERS, VELOCITY, FoundInstants
 from kempf.pipeline.channels.gaps import named_gaps
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.holds import WITHIN, Held, find_held
@@ -63,7 +63,8 @@ class Instruments:
     #: Instants, UTC ns, of the readings of a channel that were left out, see
     #: `kempf.pipeline.channels.there_and_back.leaps`.
     left_out: dict[str, Nanoseconds] = field(default_factory=dict)
-    #: Time between the rows of a table that its instruments fill, s; 0 of messages, which have stamps of their own.
+    #: Time between rows, s, of a table that has all channels and of which nothing shows whether its rows hold the last
+    #: readings; 0 of any other log.
     row_s: float = 0.0
     #: What was taken out of the instants of the log.
     found: FoundInstants = AS_TAKEN
@@ -141,7 +142,8 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)
-    row_s = table.apart_s if table.fresh and table.apart_s < inf else 0.0
+    served = {sources.get(name) for name in (*VELOCITY, *OTHERS)} - {None}
+    row_s = table.apart_s if served == {ROW} and not table.sampled and table.apart_s < inf else 0.0
     return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure, left_out, row_s)
 
 

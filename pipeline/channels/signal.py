@@ -42,9 +42,6 @@ class Signal:
     #: Number of the shape that it goes with, from 0, and the multiple of it; None where it goes with none.
     shape: int | None = None
     multiple: float = 0.0
-    #: Shape (n,). What a standard error of the multiple does to the series; where it goes with no shape, that of the
-    #: likeliest one, which is not known to be nothing. None without noise or shapes.
-    by_multiple: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -99,8 +96,7 @@ def signal(series: Series, shapes: Sequence[Float] = ()) -> Signal:
     left = min(_LEFT[best.order] / width, 1.0)
     # white noise of the readings: all of its power at frequency 0 passes
     error_std = float(np.hypot(noise_std * np.sqrt(left), around))
-    smooth, error_time_s = Series(series.time_utc_ns, value), 0.5 * series.period_s / left
-    return Signal(smooth, error_std, error_time_s, *goes_with, search.by_multiple(best))
+    return Signal(Series(series.time_utc_ns, value), error_std, 0.5 * series.period_s / left, *goes_with)
 
 
 class _Search:
@@ -162,22 +158,6 @@ class _Search:
             return value, 0.0
         rough = self._columns[:, candidate.shape] - smooth[:, candidate.shape]
         return value + candidate.multiple * rough, float(np.sqrt(candidate.multiple_variance * np.mean(rough**2)))
-
-    def by_multiple(self, candidate: _Candidate) -> Float | None:
-        """Return what a standard error of the multiple does, shape (n,); of one that was left out, counted from 0."""
-        penalty, smoother = _penalty(candidate.order, candidate.log_width), self._smoothers[candidate.order]
-        white, _ = smoother.whitened(penalty)
-        with_series, own = white[:, 0] @ white, np.einsum("ij,ij->j", white, white)
-        explained = np.where(own > 0.0, with_series**2 / np.where(own > 0.0, own, 1.0), 0.0)
-        number, variance = candidate.shape, candidate.multiple_variance
-        if not number and own.size > 1:
-            number = 1 + int(np.argmax(explained[1:]))
-            variance = (candidate.noise_variance + explained[number]) / own[number] if own[number] > 0.0 else 0.0
-        if not number:
-            return None
-        rough = self._columns[:, number] - smoother.smooth(penalty)[:, number]
-        result: Float = np.sqrt(variance) * rough
-        return result
 
 
 def _penalty(order: int, log_width: float) -> float:

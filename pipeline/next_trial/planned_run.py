@@ -83,7 +83,6 @@ def planned(track: SailedTrack, ship: Ship, like: GridRun, spec: ModelSpec) -> G
         heading_rad=heading[::ROWS],
         approach_m_s=waters.approach_m_s,
         lateral_by_late=None,
-        speed_by_turning_m_s=None,
     )
 
 

@@ -171,7 +171,7 @@ def test_a_latency_of_less_than_a_row_may_be_how_the_table_was_written() -> None
         said = as_json(replace(found, fitted=table))
         (claimed,) = said["sets"]
         assert claimed["within_rows_of_s"] == (row_s if around else None)
-        words = f"rows of {row_s:.2g} s that hold each instrument's last reading can do that by themselves"
+        words = f"; this is less than the {row_s:.2g} s between rows: a table whose rows hold the last reading of each"
         assert any(words in one for one in said["sentences"]) == around
         assert row_around(table, get("yaw_quadratic"), 0.0) is None
     # messages

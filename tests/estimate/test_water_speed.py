@@ -17,7 +17,7 @@ def series(time: np.ndarray, value: np.ndarray) -> Series:
     return Series((time * SECOND_NS).astype(np.int64), value)
 
 
-def sailed(loss: float, seed: int, noise: float = 0.05) -> tuple[Series, Series, Series, np.ndarray]:
+def sailed(loss: float, seed: int) -> tuple[Series, Series, Series, np.ndarray]:
     """Log, heading and rudder of a zigzag, the speed integrated every 10 ms: it is lost with r^2, won back in 60 s."""
     fine = np.arange(0.0, 800.0, 0.01)
     rate = 0.01 * np.tanh(3.0 * np.sin(np.pi * fine / LEG_S))
@@ -28,7 +28,7 @@ def sailed(loss: float, seed: int, noise: float = 0.05) -> tuple[Series, Series,
         v += 0.01 * ((8.0 - v) / 60.0 + wind[k] - loss * rate[k] ** 2)
     every, random = slice(0, None, 100), np.random.default_rng(seed)
     time, truth = fine[every], speed[every]
-    log = series(time, truth + noise * random.standard_normal(time.size))
+    log = series(time, truth + 0.05 * random.standard_normal(time.size))
     psi = series(time, heading[every] + 1e-3 * random.standard_normal(time.size))
     return log, psi, series(time, 0.3 * np.sign(np.sin(np.pi * (time + 10.0) / LEG_S))), truth
 
@@ -123,41 +123,3 @@ def test_what_turning_costs_is_kept_where_the_means_hardly_scatter() -> None:
     assert np.std(error) < 0.3 * np.std(straight)
     # and what is said of the error is of its size
     assert 0.3 * found.error_std < np.std(error) < 3.0 * found.error_std
-
-
-def in_standard_errors(loss: float, noise: float, seeds: int) -> tuple[np.ndarray, list[bool]]:
-    """The error of the speed along what is not known of the loss, and whether a loss was taken into it."""
-    along, taken = [], []
-    for seed in range(seeds):
-        log, heading, rudder, truth = sailed(loss=loss, seed=seed, noise=noise)
-        found = water_speed(log, heading, rudder)
-        assert found.by_multiple is not None
-        along.append((found.series.value - truth) @ found.by_multiple / (found.by_multiple @ found.by_multiple))
-        taken.append(found.shape is not None)
-    return np.array(along), taken
-
-
-def test_what_is_not_known_of_the_loss_is_stated() -> None:
-    seen, taken = in_standard_errors(loss=80.0, noise=0.05, seeds=16)
-    assert all(taken)
-    assert abs(np.mean(seen)) < 0.6 and 0.5 < np.sqrt(np.mean(seen**2)) < 1.5
-    # of a loss that a poor log does not show it counts in full
-    unseen, taken = in_standard_errors(loss=80.0, noise=1.5, seeds=16)
-    assert np.mean(taken) < 0.5
-    assert np.sqrt(np.mean(unseen**2)) < 1.5
-
-
-def test_nothing_is_said_of_the_loss_where_she_does_not_turn_or_the_log_has_no_noise() -> None:
-    log, heading, rudder, truth = sailed(loss=80.0, seed=0)
-    assert water_speed(log, heading, Series(log.time_utc_ns, np.zeros(len(log)))).by_multiple is None
-    assert water_speed(Series(log.time_utc_ns, truth), heading, rudder).by_multiple is None
-
-
-def test_the_same_is_stated_of_means() -> None:
-    log, heading, rudder, _ = sailed(loss=80.0, seed=1)
-    many = round(LEG_S / 3.0)
-    middle = np.arange(many // 2, len(log) - many // 2, many)
-    value = np.array([np.mean(log.value[k - many // 2 : k + many // 2 + 1]) for k in middle])
-    found = water_speed(Series(log.time_utc_ns[middle], value), heading, rudder, float(many))
-    assert found.by_multiple is not None and found.by_multiple.shape == found.series.value.shape
-    assert 0.0 < np.std(found.by_multiple) < 0.3 * np.std(found.series.value)

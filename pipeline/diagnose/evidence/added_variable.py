@@ -6,6 +6,7 @@ of the effect (Cook & Weisberg 1982, "Residuals and influence in regression", se
 
 from __future__ import annotations
 
+from concurrent.futures import Executor
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening.nuisance import nuisance
 from kempf.pipeline.diagnose.screening.screen import Candidate
+from kempf.pipeline.diagnose.screening.speed_noise import speed_noise
 from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.confidence import NORMAL_95
@@ -22,17 +24,23 @@ from kempf.schemas.model_spec import N_HULL
 _BINS = 14
 
 
-def added_variables(diagnosis: Diagnosis) -> tuple[AddedVariable, ...]:
-    """Return one for every effect that was added; with none, for the strongest candidate."""
+def added_variables(diagnosis: Diagnosis, workers: Executor) -> tuple[AddedVariable, ...]:
+    """Return one for every effect that was added; with none, for the strongest candidate.
+
+    Parameters
+    ----------
+    workers : Executor
+        Runs share it; nothing depends on it.
+    """
     steps = diagnosis.steps
     pairs = [(before.fit, step.chosen_from[0][0]) for before, step in pairwise(steps)]
     if not pairs:
         pairs = [(steps[0].fit, candidate) for candidate in steps[0].screened if candidate.direction.size][:1]
-    return tuple(_added_variable(fit, candidate) for fit, candidate in pairs)
+    return tuple(_added_variable(fit, candidate, workers) for fit, candidate in pairs)
 
 
-def _added_variable(fit: PooledFit, candidate: Candidate) -> AddedVariable:
-    known = nuisance(fit.linearised, N_HULL + len(fit.model.names))
+def _added_variable(fit: PooledFit, candidate: Candidate, workers: Executor) -> AddedVariable:
+    known = nuisance(speed_noise(fit, workers).of(fit).linearised, N_HULL + len(fit.model.names))
     cleaned = known.clean(known.u[:, None])[:, 0]
     # the second half of each run's part is about the spread of the innovations, not about themselves
     about_mean = np.concatenate([np.arange(line.u.size) < line.u.size // 2 for line in fit.linearised])

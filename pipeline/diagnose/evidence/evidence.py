@@ -87,7 +87,7 @@ def evidence_of(
         given=len(diagnosis.given),
         candidates=_candidates(diagnosis),
         confusion=_confusion(diagnosis.steps[0]),
-        added_variables=added_variables(diagnosis),
+        added_variables=added_variables(diagnosis, workers),
         unmodelled_before=unmodelled_acceleration(before.runs, before.states),
         unmodelled_after=None if after is before else unmodelled_acceleration(after.runs, after.states),
         manoeuvres=tuple(manoeuvres),

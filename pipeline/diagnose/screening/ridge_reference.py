@@ -18,7 +18,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.screening.formula_search import Term, search
 from kempf.pipeline.diagnose.screening.nuisance import Nuisance, nuisance
-from kempf.pipeline.diagnose.screening.speed_lost import speed_lost
+from kempf.pipeline.diagnose.screening.speed_noise import speed_noise
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.model_spec import N_HULL
@@ -119,9 +119,9 @@ def ridge_reference_of(base: PooledFit, workers: Executor) -> RidgeReference:
     """
     columns = responses(base, [EffectTrial(effect, (_SIZE,)) for effect in TERMS], workers)
     X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in columns])
-    lost = speed_lost(base, workers)
-    known = nuisance(lost.lines(base.linearised), N_HULL + len(base.model.names))
-    return _cross_validated(known, lost.beside(X), [line.u.size for line in base.linearised])
+    noise = speed_noise(base, workers)
+    known = nuisance(noise.of(base).linearised, N_HULL + len(base.model.names))
+    return _cross_validated(known, noise.beside(X), [line.u.size for line in base.linearised])
 
 
 def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> RidgeReference:

@@ -3,8 +3,8 @@
 Score (Lagrange multiplier) statistic of each candidate with all fitted parameters as nuisance: with the candidate's
 columns S of the whitened innovations and S' = (I - P_0) S what the fitted ones cannot imitate, LM = e'S'(S'S')^-1 S'e,
 chi-squared with as many degrees of freedom as the candidate has parameters, and the expected parameter change
-(S'S')^-1 S'e. Both S and e are taken beside a loss of speed that the logs do not show
-(`kempf.pipeline.diagnose.screening.speed_lost`). Reference: Breusch & Pagan (1980), "The Lagrange multiplier test and
+(S'S')^-1 S'e. Both S and e allow for what of the speed may be noise
+(`kempf.pipeline.diagnose.screening.speed_noise`). Reference: Breusch & Pagan (1980), "The Lagrange multiplier test and
 its applications to model specification in econometrics", Review of Economic Studies 47; Saris, Satorra & Sorbom (1987),
 "The detection and correction of specification errors in structural equation models", Sociological Methodology 17.
 """
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -29,12 +29,16 @@ from kempf.pipeline.diagnose.screening.effect_score import (
     solved,
 )
 from kempf.pipeline.diagnose.screening.nuisance import Nuisance, nuisance
-from kempf.pipeline.diagnose.screening.speed_lost import SpeedLost, speed_lost
+from kempf.pipeline.diagnose.screening.speed_noise import SpeedNoise, speed_noise
 from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import N_HULL
+
+
+def _nothing() -> Float:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +58,14 @@ class Candidate:
     absorption: float
     #: Channels it needs that the runs lack.
     missing: tuple[str, ...]
-    #: Shape (N,). S' times the change: what the effect would explain of the whitened innovations; its product with
-    #: these is the score.
+    #: Shape (N,). S' times the change: what the effect would explain of ``innovations``.
     direction: Float
     #: Where on its grid it was tried.
     steps: tuple[float, ...]
     #: Channels of the runs that show it already; then it is not scored.
     measured_by: tuple[str, ...] = ()
+    #: Shape (N,). e; its product with ``direction`` is the score.
+    innovations: Float = field(default_factory=_nothing)
 
 
 def screen(
@@ -102,9 +107,9 @@ def _scored(
     trials = [EffectTrial(effect, steps) for effect in tried for steps in grid(effect)]
     columns = responses(base, trials, workers, listener)
     moved = {(trial.effect.name, trial.steps): column for trial, column in zip(trials, columns, strict=True)}
-    lost = speed_lost(base, workers)
-    known = nuisance(lost.lines(base.linearised), N_HULL + len(base.model.names))
-    return list(workers.map(lambda candidate: _best(known, lost, candidate, moved), nothing))
+    noise = speed_noise(base, workers)
+    known = nuisance(noise.of(base).linearised, N_HULL + len(base.model.names))
+    return list(workers.map(lambda candidate: _best(known, noise, candidate, moved), nothing))
 
 
 def _untested(base: PooledFit, effect: Effect) -> Candidate:
@@ -114,7 +119,7 @@ def _untested(base: PooledFit, effect: Effect) -> Candidate:
 
 
 def _best(
-    known: Nuisance, lost: SpeedLost, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
+    known: Nuisance, noise: SpeedNoise, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
 ) -> Candidate:
     """Return an effect at the point of its grid where it explains most, or untested where there is none."""
     best, tries = nothing, 0
@@ -123,15 +128,14 @@ def _best(
         if columns is None:
             continue
         tries += 1
-        tested = _tested(known, lost, columns, nothing.effect, steps)
+        tested = _tested(known, noise.beside(columns), nothing.effect, steps)
         if best is nothing or tested.p_value < best.p_value or np.isnan(best.score):
             best = tested
     # the largest of several tries is larger than any one of them: Bonferroni
     return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
 
 
-def _tested(known: Nuisance, lost: SpeedLost, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
-    columns = lost.beside(columns)
+def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
     clean = known.clean(columns)
     before, after = float(np.sum(columns**2)), float(np.sum(clean**2))
     absorption = 1.0 - after / before if before > 0.0 else 1.0
@@ -148,6 +152,7 @@ def _tested(known: Nuisance, lost: SpeedLost, columns: Float, effect: Effect, st
         std=solution.std,
         absorption=absorption,
         missing=(),
-        direction=lost.beside(clean @ solution.estimate),
+        direction=clean @ solution.estimate,
         steps=steps,
+        innovations=known.u,
     )

@@ -186,18 +186,19 @@ def within_rows(fit: PooledFit, effect: Effect) -> bool:
 
 
 def row_around(runs: Sequence[GridRun], effect: Effect, size_s: float) -> float | None:
-    """Return the time between the rows of a table where a latency is smaller; None of any other effect.
+    """Return the time between rows, s, where an effect is a latency that is shorter; otherwise None.
 
-    Rows that hold the last reading of each instrument make as much of it, and nothing in them shows that they do.
+    Rows that hold the last reading of each instrument can produce a latency of that size, and the table does not show
+    that they do.
 
     Parameters
     ----------
     runs : sequence of GridRun
-        The longest time counts; logs of messages have none.
+        The shortest time counts; logs of messages have none.
     size_s : float
         Of the latency.
     """
-    row_s = max(run.instant_errors.row_s for run in runs)
+    row_s = min(run.instant_errors.row_s for run in runs)
     return row_s if effect.name in _LATE.values() and abs(size_s) < row_s else None
 
 

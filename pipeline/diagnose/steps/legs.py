@@ -46,7 +46,8 @@ def candidate_in_std(base: PooledFit, candidate: Candidate, leg_s: float) -> flo
     sums, row = [], 0
     for filtered, line in zip(base.runs, base.linearised, strict=True):
         m = line.u.size // 2
-        each = candidate.direction[row : row + 2 * m] * line.u
+        rows = slice(row, row + 2 * m)
+        each = candidate.direction[rows] * candidate.innovations[rows]
         sums.append(_summed(each[:m] + each[m:], _stretch(line.passed.innovation, filtered.run.step_s, leg_s)))
         row += 2 * m
     return in_std(np.concatenate(sums))

@@ -30,6 +30,7 @@ from kempf.pipeline.diagnose.screening.effect_score import (
     plausible,
     solved,
 )
+from kempf.pipeline.diagnose.screening.speed_noise import speed_noise
 from kempf.pipeline.diagnose.steps.confusion_sets import ALIKE
 from kempf.pipeline.diagnose.stretches.stretch_rows import Rows, rows_of
 from kempf.pipeline.distributions import chi2_tail
@@ -113,8 +114,10 @@ def explain(
     workers : Executor
         Effects share it; nothing depends on it.
     """
-    rows = rows_of(base, fitted, number, inside)
-    errors = rows.left(rows.all_rows(base))
+    noise = speed_noise(base, workers)
+    allowing = noise.of(base)
+    rows = rows_of(allowing, fitted, number, inside)
+    errors = rows.left(rows.all_rows(allowing))
     about_mean = errors[: errors.size // 2]
     square, count = float(about_mean @ about_mean), about_mean.size
     whole = sum(int(np.isfinite(filtered.run.measured).any(axis=1).sum()) for filtered in base.runs)
@@ -140,7 +143,7 @@ def explain(
 
     def tested(candidate: StretchEffect) -> StretchEffect:
         every = moved.get(candidate.effect.name, [])
-        return _best(candidate, [_tested(rows, errors, free, trial, columns) for trial, columns in every])
+        return _best(candidate, [_tested(rows, errors, free, trial, noise.beside(columns)) for trial, columns in every])
 
     candidates = list(workers.map(tested, untested))
     return replace(nothing, effects=_ranked(candidates))

@@ -91,7 +91,7 @@ def _set(diagnosis: Diagnosis, name: str, step: Step) -> dict[str, Any]:
         "separated_by": step.chosen_from[0][0].effect.separated_by if len(effects) > 1 else "",
         "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
         "stability": step.stability,
-        "within_rows_of_s": row_around_size(diagnosis, step.chosen_from[0][0].effect),
+        "within_rows_of_s": row_around_size(diagnosis, step, step.chosen_from[0][0].effect),
         "refits": [_refit(c, k, diagnosis.sizes.get(c.effect.name)) for c, k in step.chosen_from],
     }
 

@@ -20,28 +20,39 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     Where parameters fitted to legs predict better than the likelihood's, so do the sizes of effects; those of what
     could be in the place of an effect are then not given.
     """
-    row_s = row_around_size(diagnosis, effect)
-    size = _stated(diagnosis, step, effect)
-    if row_s is None:
-        return size
-    return f"{size}; rows of {row_s:.2g} s that hold each instrument's last reading can do that by themselves"
+    chosen = _chosen(diagnosis, step, effect)
+    if chosen is None:
+        return effect.title
+    values, std, how = chosen
+    row_s = row_around_size(diagnosis, step, effect)
+    rows = (
+        ""
+        if row_s is None
+        else (
+            f"; this is less than the {row_s:.2g} s between rows: a table whose rows hold the last reading of each "
+            "instrument can show such a latency where there is none"
+        )
+    )
+    return f"{_with_size(effect, values, std)}{how}{rows}"
 
 
-def row_around_size(diagnosis: Diagnosis, effect: Effect) -> float | None:
-    """Return the time between the rows of a table where a latency that is claimed is smaller, s; else None."""
-    size = diagnosis.sizes.get(effect.name)
-    return None if size is None else row_around(diagnosis.fitted, effect, float(size.values[0]))
+def row_around_size(diagnosis: Diagnosis, step: Step, effect: Effect) -> float | None:
+    """Return the time between the rows of a table, s, where a latency that is claimed is shorter; otherwise None."""
+    chosen = _chosen(diagnosis, step, effect) if effect.name in diagnosis.sizes else None
+    return None if chosen is None else row_around(diagnosis.fitted, effect, float(chosen[0][0]))
 
 
-def _stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
+def _chosen(diagnosis: Diagnosis, step: Step, effect: Effect) -> tuple[Float, Float, str] | None:
+    """Return values and standard errors of the fit that predicts better, and how it was made; None of no size."""
     ahead = diagnosis.steps[-1].ahead
     if ahead is None or ahead.disagrees is None:
-        return sized(effect, diagnosis.sizes[effect.name])
+        size = diagnosis.sizes[effect.name]
+        return size.values, size.std, ""
     if step.added is None or effect.name != step.added.name:
-        return effect.title
+        return None
     own = ahead.model.own(effect.name)
     std = ahead.std[-ahead.fit.values.size :]
-    return f"{_with_size(effect, ahead.fit.values[own], std[own])}, fitted to legs"
+    return ahead.fit.values[own], std[own], ", fitted to legs"
 
 
 def sized(effect: Effect, size: Size) -> str:

@@ -13,7 +13,6 @@ from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
-from kempf.pipeline.channels.signal import Signal
 from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.channels.there_and_back import counted
@@ -113,7 +112,6 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         warnings=tuple(warnings),
         instant_errors=on_time.errors,
         lateral_by_late=_by_late(on_time.velocity, heading, instants, measured[:, 0]),
-        speed_by_turning_m_s=_by_turning(slow, instants),
     )
 
 
@@ -125,17 +123,6 @@ def _by_late(velocity: VelocitySlope | None, heading: Series, instants: Nanoseco
     column = np.zeros((instants.size, 1))
     _place(column, 0, instants, velocity.time_utc_ns, np.nan_to_num((velocity.slope * np.exp(-1j * heads)).imag))
     return np.where(np.isfinite(lateral), column[:, 0], np.nan)
-
-
-def _by_turning(slow: Signal, instants: Nanoseconds) -> Float | None:
-    """Return `Record.speed_by_turning_m_s`."""
-    if slow.by_multiple is None:
-        return None
-    own = Series(slow.series.time_utc_ns, slow.by_multiple)
-    origin = int(own.time_utc_ns[0])
-    at = (instants - origin).astype(np.float64) / SECOND_NS
-    result: Float = np.interp(at, own.seconds_since(origin), own.value)
-    return result
 
 
 def _measured(instants: Nanoseconds, lateral: LateralSpeed, yaw: Series | None, heading: Series) -> Float:

@@ -89,8 +89,6 @@ class GridRun:
     heading_period_s: float = 0.0
     #: Shape (n,). Of the means of the lateral speed, see `kempf.pipeline.estimate.record.record.Record`.
     lateral_by_late: Float | None = None
-    #: Shape (ROWS (n - 1) + 1,). See `kempf.pipeline.estimate.record.record.Record`.
-    speed_by_turning_m_s: Float | None = None
     #: See `kempf.pipeline.estimate.record.loads`.
     load: float = 0.0
 
@@ -238,7 +236,7 @@ def averaged(record: Record, spec: ModelSpec, arm_per_m: float, length_m: float 
         Of the ship, for the grid's step.
     """
     means = plain_run("", record, spec, arm_per_m, length_m).instants()
-    return replace(record, **vars(means), lateral_by_late=None, speed_by_turning_m_s=None)
+    return replace(record, **vars(means), lateral_by_late=None)
 
 
 def make_run(
@@ -272,7 +270,7 @@ def make_run(
     measured, offset = np.full((n, 3), np.nan), np.zeros((n, 3))
     for i, column in enumerate(record.measured.T):
         measured[:, i], offset[:, i] = cell_means(record.time_s, column, step_s, n)
-    by_late, by_turning = record.lateral_by_late, record.speed_by_turning_m_s
+    by_late = record.lateral_by_late
     fine: Float = step_s / ROWS * np.arange(ROWS * (n - 1) + 1, dtype=np.float64)
     known = np.isfinite(record.heading_rad)
     inputs = np.zeros((fine.size, N_INPUT))
@@ -320,7 +318,6 @@ def make_run(
         rudder_period_s=record.rudder_period_s,
         heading_period_s=record.heading_period_s,
         lateral_by_late=None if by_late is None else cell_means(record.time_s, by_late, step_s, n)[0],
-        speed_by_turning_m_s=None if by_turning is None else np.interp(fine, record.time_s, by_turning),
     )
 
 

@@ -76,6 +76,3 @@ class Record(Instants):
     #: Shape (n,). What a second more of lateness takes from the lateral speed, m/s^2, where that was measured; None of
     #: a velocity that is not late.
     lateral_by_late: Float | None = None
-    #: Shape (n,). What a standard error of what turning costs does to the speed, see
-    #: `kempf.pipeline.estimate.record.water_speed`; None where the log has no noise or the ship does not turn.
-    speed_by_turning_m_s: Float | None = None

@@ -67,10 +67,7 @@ def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.
     straight = np.interp(instants.astype(np.float64), log.time_utc_ns.astype(np.float64), slow_means)
     missed = _MISSED * float(np.sqrt(np.mean((slow - straight)[known] ** 2)))
     error_std = float(np.hypot(mean_signal.error_std, missed))
-    turned = mean_signal.by_multiple
-    if turned is not None:
-        turned = curve_of_means(Series(log.time_utc_ns, turned), instants)[known]
-    return replace(mean_signal, series=Series(instants[known], whole[known]), error_std=error_std, by_multiple=turned)
+    return replace(mean_signal, series=Series(instants[known], whole[known]), error_std=error_std)
 
 
 def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
