@@ -2,7 +2,7 @@
 
 What she does between two readings is not in the logs, and what that leaves of a misfit is no missing physics
 (decision 0112); nor is what goes with the noise of a speed log (decision 0113). A boat of 3 m sails two zigzags on each
-of two days; instruments stamp their readings, or a table has rows of as many a second.
+of two days, or of six; instruments stamp their readings, or a table has rows of as many a second.
 """
 
 from __future__ import annotations
@@ -45,10 +45,11 @@ _SLOW: dict[str, tuple[str, ...]] = {
     "the rate gyro": ("yaw_rate",),
     "the GNSS": ("gnss",),
     "the log": ("log",),
+    "the log, on six days": ("log",),
     "the log, of three times the noise": ("log",),
     "rows of a table": (),
 }
-_NOISY = {"the log, of three times the noise": 3.0}
+_NOISY, _DAYS = {"the log, of three times the noise": 3.0}, {"the log, on six days": 6}
 _OUTCOMES = ("insufficient_data", "adequate", "unexplained")
 _CLAIMED = "claimed: "
 
@@ -105,7 +106,7 @@ def _outcomes(case: _Case) -> tuple[str, str]:
     """Return the verdict, and what it would be were the readings close enough."""
     with TemporaryDirectory() as folder, ThreadPoolExecutor(1) as workers:
         warehouse = Warehouse(folder)
-        for day in (0, 1):
+        for day in range(_DAYS.get(case.slow, 2)):
             trial = simulate_trial(_settings(case, day))
             ending, data = _log_of(case, trial)
             profile = logger_profile(trial.settings)
