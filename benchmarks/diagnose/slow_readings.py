@@ -186,6 +186,8 @@ def main() -> None:
     parser.add_argument("--cases", type=int, default=2, help="of every rate")
     given = parser.parse_args()
     head = [f"{when}: {one}" for when in ("before", "now") for one in ("not testable", *_OUTCOMES[1:], "a claim")]
+    # its processes are forked, before anything here has threads
+    simulated = _simulated(given.cases)
     apart, noisy = _measured(given.data)
     lines = [
         f"{given.cases} boats of every kind, none with an effect; the rest of the instruments gives "
@@ -194,7 +196,7 @@ def main() -> None:
         "Rows hold the last reading of each instrument, so that heading and rate of turn are of instants up to 0.1 s "
         "apart, and nothing in a table shows it: latencies of less than that are in the logs, not in the ship.",
         "",
-        *result_page.table(["slow is", "readings a second", *head], _simulated(given.cases)),
+        *result_page.table(["slow is", "readings a second", *head], simulated),
         "",
         "## Measured ships",
         "",
