@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from kempf.pipeline.diagnose.screening import unsure_instants
 from kempf.pipeline.diagnose.screening.nuisance import columns_of
 from kempf.pipeline.diagnose.screening.unsure_instants import row_around, with_instants, within_rows
 from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
+from kempf.pipeline.diagnose.verdicts.sizes import row_around_size, stated
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds
@@ -23,6 +26,7 @@ from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.updated import updated
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
@@ -176,6 +180,16 @@ def test_a_latency_of_less_than_a_row_may_be_how_the_table_was_written() -> None
         assert row_around(table, get("yaw_quadratic"), 0.0) is None
     # messages
     assert row_around(found.fitted, effect, 0.0) is None
+    # the size that is stated counts: three times as large, fitted to legs
+    fit, std = SimpleNamespace(values=np.array([3.0 * tau])), np.full(7, 0.01)
+    ahead = SimpleNamespace(disagrees=object(), model=SimpleNamespace(own=lambda _: slice(0, 1)), fit=fit, std=std)
+    legs = replace(found, steps=(found.steps[0], replace(found.steps[1], ahead=cast(Ahead, ahead))))
+    for row_s, around in ((4.0 * abs(tau), True), (2.0 * abs(tau), False)):
+        table = tuple(replace(run, instant_errors=InstantErrors(row_s=row_s)) for run in found.fitted)
+        other = replace(legs, fitted=table)
+        assert row_around_size(other, other.steps[1], effect) == (row_s if around else None)
+        assert ("between rows" in stated(other, other.steps[1], effect)) == around
+        assert "fitted to legs" in stated(other, other.steps[1], effect)
 
 
 def _unsure(fit: PooledFit, errors: InstantErrors, days: tuple[int, ...]) -> PooledFit:
