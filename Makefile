@@ -50,7 +50,7 @@ bench: $(RIVALS)
 	for name in documents.house identify.engines identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
 		identify.monte_carlo identify.current_frame documents.draw_paper documents.draw_readme identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.trials_as_sold diagnose.hsva_ladder \
-		diagnose.hsva_folds diagnose.pond_ladder diagnose.slow_rows diagnose.slow_readings diagnose.run_subsets diagnose.pond_bounds diagnose.noise_hills diagnose.diagnosis_speed identify.prediction identify.circles_in_wind identify.predicted_measured ingest.doctor_measured \
+		diagnose.hsva_folds diagnose.pond_ladder diagnose.slow_rows diagnose.slow_readings diagnose.coarse_stamps diagnose.run_subsets diagnose.pond_bounds diagnose.noise_hills diagnose.diagnosis_speed identify.prediction identify.circles_in_wind identify.predicted_measured ingest.doctor_measured \
 		ingest.mcap_speed ingest.nmea_speed ingest.nmea_clocks ingest.mcap_clocks fleet.adopt fleet.command_speed aims; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 

@@ -99,6 +99,7 @@ _ALL = (
             _MONTH,
             Column("record", "integer", "number of the line, row or message in the log"),
             Column("time_utc_ns", "integer", "instant of measurement", "ns"),
+            Column("instant_std_s", "real", "standard error of that instant; null where the log has it", "s"),
             Column("source", "text", "instrument: sentence, topic or row"),
             *(Column(channel.column, "real", channel.words, channel.unit) for channel in CHANNELS.values()),
         ),

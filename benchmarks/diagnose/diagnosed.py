@@ -10,10 +10,14 @@ from typing import Any
 from benchmarks import measured_ships, result_page
 from benchmarks.measured_ships import Ship
 from kempf.flows.jobs.diagnose.diagnose_vessel import diagnose_vessel
+from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.verdicts.verdict import verdict
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.storage.store import Warehouse
 
 _DEG = 57.29577951308232
+#: what an outcome that names effects begins with
+CLAIMED = "claimed: "
 #: candidates listed beside those that were found
 _SHOWN = 8
 
@@ -43,6 +47,12 @@ def section(stated: Mapping[str, Any]) -> list[str]:
     if blind:
         lines += ["", f"Not testable with these data: {', '.join(blind)}."]
     return [*lines, ""]
+
+
+def outcome_of(found: Diagnosis) -> str:
+    """Return the effects that are claimed, or the verdict where none is."""
+    names = [step.added.name for step in found.steps if step.added is not None]
+    return f"{CLAIMED}{' + '.join(names)}" if names else verdict(found)
 
 
 LADDER = (

@@ -16,6 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from benchmarks import measured_ships, result_page
+from benchmarks.diagnose.diagnosed import CLAIMED, outcome_of
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import LENGTH_M, VesselRuns, layout_of
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
@@ -25,7 +26,6 @@ from kempf.pipeline.diagnose.screening.resolution import unresolved
 from kempf.pipeline.diagnose.screening.ridge_reference import ridge_reference_of
 from kempf.pipeline.diagnose.screening.speed_noise import speed_noise
 from kempf.pipeline.diagnose.verdicts.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.verdicts.verdict import verdict
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
@@ -51,7 +51,6 @@ _SLOW: dict[str, tuple[str, ...]] = {
 }
 _NOISY, _DAYS = {"the log, of three times the noise": 3.0}, {"the log, on six days": 6}
 _OUTCOMES = ("insufficient_data", "adequate", "unexplained")
-_CLAIMED = "claimed: "
 
 
 @dataclass(frozen=True)
@@ -114,18 +113,13 @@ def _outcomes(case: _Case) -> tuple[str, str]:
         layout = layout_of(warehouse, choose(warehouse, _HULL), ModelSpec())
         runs = layout.runs()
         found = diagnose(runs.runs, runs.spec, catalogue(), workers, lay_out=layout.runs_at)
-        return _said(found), _said(_were_it_resolved(found))
+        return outcome_of(found), outcome_of(_were_it_resolved(found))
 
 
 def _were_it_resolved(found: Diagnosis) -> Diagnosis:
     if found.unresolved is None or found.something_left:
         return replace(found, unresolved=None)
     return replace(found, unresolved=None, steps=(*found.steps, *found.imitating), imitating=())
-
-
-def _said(found: Diagnosis) -> str:
-    names = [step.added.name for step in found.steps if step.added is not None]
-    return f"{_CLAIMED}{' + '.join(names)}" if names else verdict(found)
 
 
 def _simulated(cases: int) -> list[list[str]]:
@@ -145,7 +139,7 @@ def _simulated(cases: int) -> list[list[str]]:
 
 def _cells(count: Counter[str]) -> list[str]:
     claims = [
-        f"{number} {one.removeprefix(_CLAIMED)}" for one, number in sorted(count.items()) if one.startswith(_CLAIMED)
+        f"{number} {one.removeprefix(CLAIMED)}" for one, number in sorted(count.items()) if one.startswith(CLAIMED)
     ]
     return [*(str(count[one]) for one in _OUTCOMES), "; ".join(claims)]
 

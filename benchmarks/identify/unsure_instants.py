@@ -1,8 +1,9 @@
 """What is gained where instants of measurement are found with the hull: simulated ships, then every log at hand.
 
-A log whose rows repeat the last value of every instrument does not say when it was measured. The simulated ships carry
-instruments whose clocks nobody has set by the rows; their hulls are known. Of the others it is shown what moves: the
-hull, its errors, and the free runs. Logs are those of ``../shared``, where there.
+A log whose rows repeat the last value of every instrument does not say when it was measured, nor does one whose stamps
+several sentences share. The simulated ships carry instruments whose clocks nobody has set by these; their hulls are
+known. Of the others it is shown what moves: the hull, its errors, and the free runs. Logs are those of ``../shared``,
+where there.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import astuple, dataclass, fields
+from dataclasses import astuple, dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -18,23 +20,36 @@ import numpy as np
 
 from benchmarks import measured_ships, result_page
 from benchmarks.identify.prediction import plain_ship
+from benchmarks.ingest.restamped import burst, restamped, whole_second
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.default_model import default_model_of
 from kempf.flows.jobs.identify.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
-from kempf.pipeline.channels.instant_errors import InstantErrors
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening.unsure_instants import with_instants
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.predict.free_run import free_run_of
+from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.schemas.confidence import NORMAL_95
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import HULL_PARAMETERS
 
-_SHIPS, _CLOCKS = 40, tuple(one.name for one in fields(InstantErrors))
+_SHIPS = 40
+#: Fields of `InstantErrors`.
+_CLOCKS = ("velocity_s", "heading_s", "yaw_rate_s", "rudder_s", "smoothing_s")
 #: Rows a second: as fast as data acquisition writes them, as fast as a compass, slower than one, as slow as a receiver.
 _RATES_HZ = (10.0, 5.0, 2.0, 1.0)
+_IN_ROWS = {f"rows of {rate_hz:g} Hz": plain_ship.in_rows(rate_hz) for rate_hz in _RATES_HZ}
+#: NMEA 0183, by what the logger writes in front of a sentence: the instant of its arrival, the second in which it
+#: came, when it last looked (once a second), and nothing.
+_IN_SENTENCES = {
+    "stamps of milliseconds": ("trial.nmea.gz", to_nmea),
+    "stamps of whole seconds": ("trial.nmea", partial(restamped, stamp=whole_second)),
+    "bursts of a second": ("trial.nmea", partial(restamped, stamp=burst)),
+    "no stamps": ("trial.nmea", partial(restamped, stamp=None)),
+}
+_LOGS: dict[str, plain_ship.Written] = {**_IN_ROWS, **_IN_SENTENCES}
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,11 +94,11 @@ def _free_runs(fit: PooledFit) -> list[float]:
     return [free_run_of(filtered, fit.hull, fit.values).relative_error for filtered in fit.runs]
 
 
-def simulated(number: int, rate_hz: float, workers: Executor) -> tuple[Outcome, Float]:
-    """Return a simulated ship of a log of so many rows a second, and the hull that she truly has, shape (6,)."""
+def simulated(number: int, written: plain_ship.Written, workers: Executor) -> tuple[Outcome, Float]:
+    """Return a simulated ship, and the hull that she truly has, shape (6,)."""
     hull, _ = plain_ship.drawn(number)
     with TemporaryDirectory() as folder:
-        warehouse = plain_ship.taken_in(hull, number, Path(folder), rate_hz)
+        warehouse = plain_ship.taken_in(hull, number, Path(folder), written)
         runs = assembled(warehouse, choose(warehouse, hull.name), default_model_of(warehouse, hull.name))
     return outcome(hull.name, runs, workers), np.array(astuple(hull.parameters))
 
@@ -109,26 +124,27 @@ def thinned(data: Path, workers: Executor) -> Iterator[Outcome]:
 
 
 def page(
-    ships: Mapping[float, Sequence[tuple[Outcome, Float]]], others: Sequence[Outcome], slow: Sequence[Outcome]
+    ships: Mapping[str, Sequence[tuple[Outcome, Float]]], others: Sequence[Outcome], slow: Sequence[Outcome]
 ) -> list[str]:
     """Return the lines of the page."""
     inside, rms = [], []
-    for rate_hz, of_rate in ships.items():
-        true = np.array([hull for _, hull in of_rate])
+    for log, of_log in ships.items():
+        true = np.array([hull for _, hull in of_log])
         for words, found in (
-            ("as they are taken", [(one.fixed, one.fixed_std) for one, _ in of_rate]),
-            ("free", [(one.free, one.free_std) for one, _ in of_rate]),
+            ("as they are taken", [(one.fixed, one.fixed_std) for one, _ in of_log]),
+            ("free", [(one.free, one.free_std) for one, _ in of_log]),
         ):
             hull, std = np.array(found).swapaxes(0, 1)
             within, error = np.abs(hull - true) < NORMAL_95 * std, np.sqrt(np.mean((hull / true - 1.0) ** 2, axis=0))
-            inside.append([f"{rate_hz:g}", words, *(f"{100.0 * np.mean(part):.0f} %" for part in (*within.T, within))])
-            rms.append([f"{rate_hz:g}", words, *(f"{100.0 * x:.2f} %" for x in error)])
-    head = ["rows a second", "instants", *HULL_PARAMETERS, "all"]
+            inside.append([log, words, *(f"{100.0 * np.mean(part):.0f} %" for part in (*within.T, within))])
+            rms.append([log, words, *(f"{100.0 * x:.2f} %" for x in error)])
+    head = ["log", "instants", *HULL_PARAMETERS, "all"]
     lines = [
         f"## {len(next(iter(ships.values())))} simulated ships",
         "",
-        "A 20/20 and a 10/10 zigzag in wind and stream, logged in rows, with instruments of 1 to 5 Hz whose clocks "
-        "stand anywhere in a row. 95 % intervals of the hull that hold the truth:",
+        "A 20/20 and a 10/10 zigzag in wind and stream, with instruments of 1 to 5 Hz whose clocks stand anywhere in a "
+        "row or a second: logged in rows, and as NMEA 0183 by what stands in front of a sentence. 95 % intervals of "
+        "the hull that hold the truth:",
         "",
         *result_page.table(head, inside),
         "",
@@ -183,11 +199,11 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path("../shared"))
     given = parser.parse_args()
     with ThreadPoolExecutor(usable()) as workers:
-        ships: dict[float, list[tuple[Outcome, Float]]] = {}
-        for rate_hz in _RATES_HZ:
+        ships: dict[str, list[tuple[Outcome, Float]]] = {}
+        for log, written in _LOGS.items():
             for number in range(given.ships):
-                ships.setdefault(rate_hz, []).append(simulated(number, rate_hz, workers))
-                print(f"{rate_hz:g} Hz: {number + 1} of {given.ships} simulated ships", flush=True)
+                ships.setdefault(log, []).append(simulated(number, written, workers))
+                print(f"{log}: {number + 1} of {given.ships} simulated ships", flush=True)
         others = []
         for one in measured(given.data, workers):
             others.append(one)

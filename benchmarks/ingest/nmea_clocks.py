@@ -6,21 +6,19 @@ off, coarse or late, and each is identified from; what comes out is compared wit
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from math import floor
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from benchmarks import result_page
+from benchmarks.ingest.restamped import Sentence, burst, iso, sentences_of, whole_second, written
 from kempf.flows.jobs.identify.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest.ingest_logs import ingest_log
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.logger_profile import logger_profile
-from kempf.pipeline.simulate.nmea_log import checksum, to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.profile import VesselProfile
@@ -30,53 +28,13 @@ HULL = ("a11", "a12", "a21", "a22", "b1", "b2")
 SETTINGS = zigzag_settings("mariner", duration_s=820.0, seed=5)
 
 
-@dataclass(frozen=True)
-class Sentence:
-    """What an instrument says."""
-
-    #: When it arrives, UTC s.
-    at_s: float
-    #: Between ``$`` and ``*``.
-    body: str
-
-
 Log = list[Sentence]
-Stamp = Callable[[float], str]
-
-
-def sound() -> Log:
-    """Return the log as it should be."""
-    lines = gzip.decompress(to_nmea(simulate_trial(SETTINGS), damaged_share=0.0)).decode("ascii").split("\r\n")[:-1]
-    stamps = np.array([line[:23] for line in lines], dtype="datetime64[ms]").astype(np.int64)
-    return [Sentence(ms / 1e3, line[26:-3]) for ms, line in zip(stamps.tolist(), lines, strict=True)]
-
-
-def iso(at_s: float) -> str:
-    return f"{np.datetime64(round(at_s * 1e3), 'ms')}Z "
-
-
-def written(log: Log, stamp: Stamp | None) -> bytes:
-    """Write sentences in the order in which they arrive, behind their stamps where there are any."""
-    lines = [
-        f"{stamp(one.at_s) if stamp else ''}${one.body}*{checksum(one.body)}"
-        for one in sorted(log, key=lambda one: one.at_s)
-    ]
-    return "\r\n".join([*lines, ""]).encode("ascii")
 
 
 def ahead(lead: Callable[[float], float], log: Log) -> bytes:
     """By the clock of a logger that leads, s, by so much after so many seconds."""
     start = log[0].at_s
     return written(log, lambda at: iso(at + lead(at - start)))
-
-
-def whole_seconds(log: Log) -> bytes:
-    return written(log, lambda at: iso(floor(at)))
-
-
-def bursts(log: Log) -> bytes:
-    """By a logger that looks once a second."""
-    return written(log, lambda at: iso(floor(at - 0.63) + 1.63))
 
 
 def of(log: Log, address: str) -> Log:
@@ -116,8 +74,8 @@ TROUBLES: dict[str, Callable[[Log], bytes]] = {
     "logger's clock 0.9 s ahead, as a receiver that sends late": partial(ahead, lambda _: 0.9),
     "logger's clock 3 s ahead, set right on the way": partial(ahead, lambda since: 3.0 if since < 400.0 else 0.0),
     "logger's clock 0.3 % fast": partial(ahead, lambda since: 0.003 * since),
-    "stamps of whole seconds": whole_seconds,
-    "stamps in bursts of a second": bursts,
+    "stamps of whole seconds": lambda log: written(log, whole_second),
+    "stamps in bursts of a second": lambda log: written(log, burst),
     "a display that repeats the gyro late, twice as often": lambda log: written(repeater(log), iso),
     "none, without stamps": lambda log: written(log, None),
     "without stamps, a second receiver 2 s late": lambda log: written(second_receiver(2.05, log), None),
@@ -174,7 +132,7 @@ def rows(found: dict[str, Identified]) -> Iterator[tuple[str, ...]]:
 
 def main() -> None:
     """Run the benchmark and write its page."""
-    log = sound()
+    log = sentences_of(simulate_trial(SETTINGS))
     found = {}
     for name, trouble in TROUBLES.items():
         found[name] = identified(trouble(log), "log.nmea", logger_profile(SETTINGS))

@@ -14,8 +14,8 @@ class InstantErrors:
     """Standard errors of the instants at which the instruments of a log measured, s; 0 where they are in the log.
 
     A value in rows that sample their instruments was measured somewhere within the row before it first shows (decisions
-    0073 and 0109), and a velocity that is smoothed comes late (decision 0045). Both are off by as much in all
-    manoeuvres of a log.
+    0073 and 0109), one behind a stamp of whole seconds somewhere within that second (decision 0114), and a velocity
+    that is smoothed comes late (decision 0045). All are off by as much in all manoeuvres of a log.
     """
 
     velocity_s: float = 0.0
@@ -73,6 +73,6 @@ def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:
         if instant_std_s.get(name, 0.0) > 0.0:
             by_size.setdefault(f"{instant_std_s[name]:.1g}", []).append(name.replace("_", " "))
     return tuple(
-        f"the rows of the log have instants of their own: those of {listed(names)} are known to {size} s (1 s.e.)"
+        f"the log does not have the instants of {listed(names)}: they are known to {size} s (1 s.e.)"
         for size, names in by_size.items()
     )

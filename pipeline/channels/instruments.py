@@ -7,7 +7,7 @@ here, so that later rooms know one form only.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import hypot, inf
 
 import numpy as np
 import polars as pl
@@ -58,7 +58,8 @@ class Instruments:
     notes: tuple[str, ...]
     #: Channels that the log does not have and that were computed from others.
     derived: frozenset[str] = frozenset()
-    #: Standard error, s, of the instants of a channel in rows that were written at a rate of their own (decision 0109).
+    #: Standard error, s, of the instants of a channel in rows that were written at a rate of their own (decision 0109),
+    #: or behind stamps that several readings share (decision 0114).
     instant_std_s: dict[str, float] = field(default_factory=dict)
     #: Instants, UTC ns, of the readings of a channel that were left out, see
     #: `kempf.pipeline.channels.there_and_back.leaps`.
@@ -105,6 +106,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
     groups = [group for group in groups if there.issuperset(_columns(group))]
     counts = _counts(frame, [*groups, *((name,) for group in groups if len(group) > 1 for name in group)])
+    stamped = dict(counts.select("source", pl.col("instant_std_s").fill_null(0.0)).iter_rows())
     if counts["readings"].sum() <= _SHORT:
         frame = frame.collect().lazy()
     series: dict[str, Series] = {}
@@ -127,9 +129,10 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         notes += own_notes
         series |= channels
         sources |= dict.fromkeys(channels, source)
+        if (std_s := hypot(held.std_s, stamped[source])) > 0.0:
+            unsure |= dict.fromkeys(channels, std_s)
         if held.rows_per_value > 1:
             table.repeats = table.repeats or source == ROW
-            unsure |= dict.fromkeys(channels, held.std_s)
         elif source == ROW and held.time_utc_ns.size >= _FILLED * table.rows:
             table.fresh += channels
     gaps, leaping = named_gaps(series), list[str]()
@@ -209,12 +212,15 @@ def _name(group: tuple[str, ...]) -> str:
 
 
 def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
-    """Count the readings, and those that give all channels of a group: a row a source, sorted by name."""
+    """Count the readings, and those that give all channels of a group: a row a source, sorted by name.
+
+    Beside it, what is known of the source's instants.
+    """
     whole = [pl.all_horizontal(pl.col(_columns(g)).is_not_null()).sum().alias(_name(g)) for g in groups]
     return (
         frame.drop_nulls(["time_utc_ns", "source"])
         .group_by("source")
-        .agg(pl.len().alias("readings"), *whole)
+        .agg(pl.len().alias("readings"), pl.col("instant_std_s").median(), *whole)
         .sort("source")
         .collect()
     )

@@ -34,6 +34,8 @@ class Spread:
 
     #: Shape (n,). `NO_TIME` where a record has none.
     time_ns: Nanoseconds
+    #: Shape (n,). Within what time about it a record was made, ns; 0 where it was not moved.
+    share_ns: Nanoseconds
     #: What a stamp stands for, usually, ns; None where nothing was spread.
     lasting_ns: int | None = None
     #: Whether the stamps were whole seconds, and not those of bursts.
@@ -82,8 +84,9 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Spread:
         Which instrument a record comes from; -1 where none is read.
     """
     (record,) = np.nonzero((stamp_ns != NO_TIME) & (source >= 0))
+    as_they_are = Spread(stamp_ns, np.zeros_like(stamp_ns))
     if record.size == 0:
-        return Spread(stamp_ns)
+        return as_they_are
     stamp, own = stamp_ns[record], source[record]
     whole = are_whole(stamp)
     # records that follow each other, and no others: a log may hold one stretch twice
@@ -92,7 +95,7 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Spread:
     begun = stamp[first][burst - 1]
     # most logs have none, which their first records show
     if not whole and _usual(own[:_SAMPLE], burst[:_SAMPLE], begun[:_SAMPLE]) is None:
-        return Spread(stamp_ns)
+        return as_they_are
     shares = shares_of(own, burst)
     shared, came = shares.shared, begun[shares.order]
     if whole:
@@ -101,14 +104,26 @@ def spread(stamp_ns: Nanoseconds, source: Index) -> Spread:
     else:
         usual = _usual(own, burst, begun)
         if usual is None:
-            return Spread(stamp_ns)
+            return as_they_are
         since = np.concatenate(([usual], np.diff(came[shares.heads])))
         since[(since <= 0) | (since > _USUAL * usual)] = usual  # another source, a pause, one that speaks seldom
         lasting, ends = np.repeat(since, shares.count), came
-    result = stamp_ns.copy()
+    result, share = stamp_ns.copy(), np.zeros_like(stamp_ns)
     # each in the middle of its share of the time
     result[record[shares.order]] = ends - (2 * (shared - shares.place) - 1) * lasting // (2 * shared)
-    return Spread(result, usual, whole)
+    share[record[shares.order]] = lasting // shared
+    return Spread(result, share, usual, whole)
+
+
+def unsure_s(share_ns: Nanoseconds) -> float:
+    """Return the standard error of instants that lie anywhere within their shares of the time, s; 0 of none.
+
+    Parameters
+    ----------
+    share_ns : ndarray of int64, shape (m,)
+        Of the records of one source; the median counts.
+    """
+    return float(np.median(share_ns)) / SECOND_NS / 12.0**0.5 if share_ns.size else 0.0
 
 
 def _usual(source: Index, burst: Index, came_ns: Nanoseconds) -> int | None:

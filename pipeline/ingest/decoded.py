@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import Protocol
@@ -166,6 +167,8 @@ class Decoded:
     next_step: str = ""
     #: Whether no record of the log comes behind these.
     ends: bool = True
+    #: Standard error, s, of the instants of a source where the log does not have them, by name.
+    instant_std_s: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return int(self.record.size)

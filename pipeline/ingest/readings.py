@@ -17,10 +17,12 @@ import polars as pl
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.channels import CHANNEL_COLUMNS
 
-#: Columns of `Readings.frame`; the channel columns are Float64 in SI, null where the record does not carry them.
+#: Columns of `Readings.frame`; the channel columns are Float64 in SI, null where the record does not carry them;
+#: ``instant_std_s`` is null where the log has the instant.
 READING_SCHEMA: dict[str, pl.DataType] = {
     "record": pl.Int64(),
     "time_utc_ns": pl.Int64(),
+    "instant_std_s": pl.Float64(),
     "source": pl.String(),
     **{column: pl.Float64() for column in CHANNEL_COLUMNS},
 }

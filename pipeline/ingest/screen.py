@@ -187,14 +187,16 @@ def _refuse_emptied(decoded: Decoded, reason: Code, refused: dict[str, Code]) ->
 
 def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_format: str) -> Readings:
     kept = np.flatnonzero(reason == 0)
+    # most logs have few of the channels, and all instants: one column of nothing serves all others
+    nothing = pl.Series(pa.nulls(kept.size, pa.float64()))
+    std_s = pl.Series([decoded.instant_std_s.get(name) for name in decoded.source_names], dtype=pl.Float64)
     columns: dict[str, pl.Series] = {
         "record": pl.Series(decoded.record[kept], dtype=pl.Int64),
         "time_utc_ns": pl.Series(decoded.time_utc_ns[kept], dtype=pl.Int64),
+        "instant_std_s": _of_source(decoded, kept, std_s) if decoded.instant_std_s else nothing,
         "source": _source_names(decoded, kept),
     }
     values_read = values_kept = 0
-    # most logs have few of the channels: one column of nothing serves all others
-    nothing = pl.Series(pa.nulls(kept.size, pa.float64()))
     for channel in CHANNELS.values():
         if channel.name not in refused:
             columns[channel.column] = nothing
@@ -257,6 +259,10 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
 
 
 def _source_names(decoded: Decoded, record: Index) -> pl.Series:
-    names = pl.Series([*decoded.source_names, None], dtype=pl.String)
+    return _of_source(decoded, record, pl.Series(decoded.source_names, dtype=pl.String))
+
+
+def _of_source(decoded: Decoded, record: Index, by_source: pl.Series) -> pl.Series:
+    """Return what belongs to the source of each record; null of one without."""
     code = decoded.source[record]
-    return names.gather(np.where(code < 0, len(decoded.source_names), code)).alias("source")
+    return by_source.extend_constant(None, 1).gather(np.where(code < 0, len(by_source), code))

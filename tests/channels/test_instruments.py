@@ -41,6 +41,19 @@ def gnss(t: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
     }
 
 
+def test_what_is_not_known_of_the_instants_of_the_source_that_serves_is_kept() -> None:
+    t = np.arange(0.0, 100.0, 0.5)
+    coarse = frame(("HEHDT", t, {"heading_rad": 0.1 * np.sin(t / 9.0)}), ("GPRMC", t[::2], gnss(t[::2]))).with_columns(
+        pl.when(pl.col("source") == "HEHDT").then(0.14).alias("instant_std_s")
+    )
+    assert from_readings(coarse).instant_std_s == {"heading": 0.14}
+    # another source, less frequent, serves nothing
+    both = pl.concat([coarse, frame(("HCHDG", t[::3], {"heading_rad": 0.1 * np.sin(t[::3] / 9.0)}))])
+    assert from_readings(both).sources["heading"] == "HEHDT" and from_readings(both).instant_std_s == {"heading": 0.14}
+    exact = coarse.with_columns(pl.lit(None, dtype=pl.Float64).alias("instant_std_s"))
+    assert from_readings(exact).instant_std_s == {}
+
+
 def test_the_source_with_most_readings_serves_the_channel() -> None:
     fast, slow = np.arange(0.0, 100.0, 0.2), np.arange(0.0, 100.0, 1.0)
     found = from_readings(

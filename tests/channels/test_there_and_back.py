@@ -80,12 +80,16 @@ def test_what_was_sailed_within_a_gap_is_not_judged():
     assert not leaps(Series(later, rate), "yaw_rate").any()
 
 
+def readings_of(made, column):
+    frame = pl.DataFrame({"time_utc_ns": made.time_utc_ns, "source": "row", column: made.value})
+    return frame.with_columns(pl.lit(None, dtype=pl.Float64).alias("instant_std_s"))
+
+
 def test_the_log_says_how_many_were_left_out():
     rate = turning()
     rate[[401, 610]] = DROPOUT
     made = series(rate)
-    frame = pl.DataFrame({"time_utc_ns": made.time_utc_ns, "source": "row", "yaw_rate_rad_s": made.value})
-    found = from_readings(frame)
+    found = from_readings(readings_of(made, "yaw_rate_rad_s"))
     assert len(found.series["yaw_rate"]) == 798
     assert found.left_out["yaw_rate"].tolist() == made.time_utc_ns[[401, 610]].tolist()
     (note,) = [note for note in found.notes if "leap" in note]
@@ -146,8 +150,7 @@ def test_a_rudder_is_bridged_where_readings_are_left_out():
     angle = np.deg2rad(steering(noise=0.0))
     angle[[213, 214]] = np.deg2rad(-45.0)
     made = series(angle, 0.5)
-    frame = pl.DataFrame({"time_utc_ns": made.time_utc_ns, "source": "row", "rudder_angle_rad": made.value})
-    found = from_readings(frame)
+    found = from_readings(readings_of(made, "rudder_angle_rad"))
     rudder = found.series["rudder_angle"]
     assert rudder.time_utc_ns.tolist() == made.time_utc_ns.tolist()
     assert np.allclose(np.rad2deg(rudder.value[[213, 214]]), 20.0)

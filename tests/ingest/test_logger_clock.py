@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 
 import numpy as np
+import polars as pl
 import pytest
 
 from tests.ingest.test_nmea_clock import START, read, rmc, sentence
@@ -73,11 +74,19 @@ def test_what_a_receiver_takes_to_send_turns_no_time_back() -> None:
     assert np.abs(off + 0.2).max() < 0.1
 
 
+def unsure_s(readings) -> list[float | None]:
+    """The standard errors of the instants of headings, s; fixes have their own."""
+    fixes, headings = (readings.frame.filter(pl.col("source") == source) for source in ("GPRMC", "HEHDT"))
+    assert fixes.height and fixes["instant_std_s"].is_null().all()
+    return headings["instant_std_s"].unique().to_list()
+
+
 def test_stamps_of_whole_seconds_are_spread_over_the_second() -> None:
     readings = read(*log(stamp=lambda when: f"{when:%Y-%m-%dT%H:%M:%S}Z"))
     assert readings.tally.records_rejected == 0 and "whole seconds" in readings.notes[0]
-    # each in the middle of its fifth of a second
+    # each in the middle of its fifth of a second, in which it may have been measured at any time
     np.testing.assert_allclose(late(readings), 0.1, atol=1e-6)
+    assert unsure_s(readings) == [pytest.approx(0.2 / 12.0**0.5)]
 
 
 def test_what_comes_in_bursts_is_spread_over_the_time_before() -> None:
@@ -89,6 +98,7 @@ def test_what_comes_in_bursts_is_spread_over_the_time_before() -> None:
     assert readings.tally.records_rejected == 0 and "in bursts, every 1 s (median)" in readings.notes[0]
     # in the first and the last burst there are fewer
     assert np.abs(late(readings)[RATE_HZ:-RATE_HZ]).max() < 0.2
+    assert unsure_s(readings) == [pytest.approx(0.2 / 12.0**0.5)]
 
 
 def bursty(writing_s: float, until_s=lambda second, words: np.ceil(second - 0.5) + 0.5) -> list[str]:
@@ -178,7 +188,7 @@ def test_a_date_that_is_late_at_midnight_moves_no_stamp() -> None:
 def test_stamps_as_they_should_be_are_left_alone() -> None:
     readings = read(*log())
     np.testing.assert_allclose(late(readings), 0.03, atol=1e-6)
-    assert readings.notes == ()
+    assert readings.notes == () and unsure_s(readings) == [None]
 
 
 def plain(*others: list[str]) -> list[str]:

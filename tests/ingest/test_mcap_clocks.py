@@ -188,6 +188,9 @@ def test_whole_seconds_are_spread() -> None:
     assert readings.tally.records_rejected == 0
     assert np.abs(off_s(readings, "/gyro")).max() < 0.25
     assert "whole seconds" in readings.notes[0] and "`publish_time`" in readings.notes[0]
+    std_s = dict(readings.frame.group_by("source").agg(pl.col("instant_std_s").unique().item()).iter_rows())
+    assert all(f"{source} ({own_s:.2g} s)" in readings.notes[0] for source, own_s in std_s.items())
+    assert std_s["/log"] == pytest.approx(12.0**-0.5)
 
 
 def test_a_topic_of_whole_seconds_that_comes_once_in_each_is_meant_so() -> None:

@@ -2,6 +2,7 @@
 
 from datetime import UTC, datetime, timedelta
 
+import polars as pl
 import pytest
 
 from kempf.pipeline.ingest.nmea.decode import decode
@@ -175,6 +176,23 @@ def test_sentences_faster_than_the_fix_are_spread_over_the_time_between_two():
     heading = readings.frame.filter(readings.frame["source"] == "HEHDT")["time_utc_ns"].to_numpy()
     assert (heading - int(START.timestamp()) * 10**9).tolist() == [k * 200_000_000 for k in range(20)]
     assert readings.notes[0].endswith("spread evenly over it: HEHDT.")
+
+
+def test_what_is_not_known_of_instants_without_a_stamp_is_kept_with_them():
+    lines = []
+    for k in range(30):
+        lines += [rmc(START + timedelta(seconds=k)), *(sentence(f"HEHDT,{k}.{j},T") for j in range(5))]
+        # said by the receiver, with its fix; and by an instrument, some time until the next one
+        lines += [sentence("GPVTG,10.0,T,,M,8.0,N,14.8,K,A"), sentence(f"TIROT,{k / 10},A")]
+    frame = read(*lines).frame
+    std_s = dict(frame.group_by("source").agg(pl.col("instant_std_s").unique().item()).iter_rows())
+    # anywhere within a fifth of a second after its instant, and within a second
+    assert std_s == {
+        "GPRMC": None,
+        "GPVTG": None,
+        "HEHDT": pytest.approx(0.2 / 3**0.5),
+        "TIROT": pytest.approx(1.0 / 3**0.5),
+    }
 
 
 def test_a_pause_of_the_log_is_not_filled():

@@ -8,6 +8,7 @@ in which every reading has its own instant.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from dataclasses import astuple, replace
 from math import degrees
 from pathlib import Path
@@ -36,12 +37,16 @@ from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, Step, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.mcap_log import to_mcap
-from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, TrialSettings, simulate_trial
+from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, Trial, TrialSettings, simulate_trial
 from kempf.schemas.errors import UsageError
 from kempf.warehouse.storage.store import Warehouse
 
 _HULLS = ("mariner", "container", "tanker", "ferry")
 _SEED = 20061
+#: A log's file name, and how it is written.
+Written = tuple[str, Callable[[Trial], bytes]]
+#: The log in which every reading has its own instant.
+STAMPED: Written = "trial.mcap", to_mcap
 #: The longest that a zigzag takes, in the time in which she sails her own length.
 _LONGEST_LENGTHS = {20.0: 45.0, 10.0: 35.0}
 #: No ship drifts or turns more, as v / u and as r L / u: hulls reach 0.8 and 1.3.
@@ -99,21 +104,26 @@ def compared(number: int, *, stamped: bool) -> ComparedShip:
     """
     hull, _ = drawn(number)
     with tempfile.TemporaryDirectory() as folder:
-        warehouse = taken_in(hull, number, Path(folder), None if stamped else 10.0)
+        warehouse = taken_in(hull, number, Path(folder), STAMPED if stamped else in_rows(10.0))
         pool_vessel(warehouse, hull.name, Request(), identify_vessel(warehouse, hull.name))
         figures, refused, models = predicted_beside(warehouse, hull.name, hull.trial_speed_m_s, _truth(hull))
     return ComparedShip("stamped" if stamped else "plain", hull.name, "", figures, refused, models=models)
 
 
-def taken_in(hull: SimulatedHull, number: int, folder: Path, rows_hz: float | None = None) -> Warehouse:
+def in_rows(rows_hz: float) -> Written:
+    """Return a log of so many rows a second."""
+    return "trial.csv", lambda trial: to_csv(trial, rows_hz)
+
+
+def taken_in(hull: SimulatedHull, number: int, folder: Path, written: Written = STAMPED) -> Warehouse:
     """Sail her zigzags in wind and stream and take their log in.
 
     Parameters
     ----------
     folder : Path
         Of the log and of the warehouse.
-    rows_hz : float, optional
-        Rows of the log, a second; without them every reading has its own instant.
+    written : Written, optional
+        Her log.
     """
     own_s = hull.length_m / hull.trial_speed_m_s
     steps = (
@@ -125,8 +135,9 @@ def taken_in(hull: SimulatedHull, number: int, folder: Path, rows_hz: float | No
     settings = TrialSettings(
         hull, steps, PAPER_ENVIRONMENT, _instruments(number), seed=number, heading_deg=20.0 * number
     )
-    log, trial = folder / ("trial.csv" if rows_hz else "trial.mcap"), simulate_trial(settings)
-    log.write_bytes(to_csv(trial, rows_hz) if rows_hz else to_mcap(trial))
+    name, bytes_of = written
+    log = folder / name
+    log.write_bytes(bytes_of(simulate_trial(settings)))
     warehouse = Warehouse(str(folder / "warehouse"))
     ingest(warehouse, [log], hull.name, logger_profile(settings))
     return warehouse

@@ -1,11 +1,12 @@
 """A fit whose instruments measured at instants that are not quite known: what it would be with them free.
 
 The instants of values in rows that sample their instruments (`kempf.pipeline.channels.instruments`) are known to a part
-of a row: some hundredths of a second, up to half a second. A fit believes them, and its hull is off by what they are
-off, in every manoeuvre of the log to one side. Here they are parameters of each log, with what is known of them as a
-normal distribution, and are found together with hull and effects by one step of Gauss and Newton: what that leaves is
-shown by `benchmarks.identify.unsure_instants`. A diagnosis lays the runs out anew at the instants that the step finds,
-and the next one goes on from there (`kempf.pipeline.diagnose.screening.found_instants`).
+of a row, those behind stamps that several readings share to a part of the time that the stamp stands for
+(`kempf.pipeline.ingest.bursts`): some hundredths of a second, up to half a second. A fit believes them, and its hull is
+off by what they are off, in every manoeuvre of the log to one side. Here they are parameters of each log, with what is
+known of them as a normal distribution, and are found together with hull and effects by one step of Gauss and Newton:
+what that leaves is shown by `benchmarks.identify.unsure_instants`. A diagnosis lays the runs out anew at the instants
+that the step finds, and the next one goes on from there (`kempf.pipeline.diagnose.screening.found_instants`).
 
 The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.undelayed_speeds`) is known no better, and is
 not found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and
@@ -49,8 +50,8 @@ _LATE: Mapping[str, str] = MappingProxyType(
 )
 #: by how much they are tried, s
 _STEP_S = 0.05
-#: standard deviations of an instant that lies anywhere in a row: to the row's end, which is the most that it is moved,
-#: and over the whole row, by which two instruments may be apart
+#: standard deviations of an instant that lies anywhere in a row or a second: to its end, which is the most that it is
+#: moved, and over the whole of it, by which two instruments may be apart
 _MOST, _APART = 3.0**0.5, 12.0**0.5
 #: how far beyond the most an instant may be found that lies there: it has an error, too
 _BEYOND = 1.25

@@ -70,7 +70,7 @@ class Confirmation:
     unseen: Unseen
     #: ``fit`` as it is stated.
     stated: WithInstants
-    #: Whether it is a latency that may be in the rows of the log alone, which repeat values.
+    #: Whether it is a latency that may be in the log alone, in rows that repeat values or behind coarse stamps.
     within_rows: bool = False
     #: Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
     #: ``before``: none.

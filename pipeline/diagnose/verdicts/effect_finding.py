@@ -172,7 +172,7 @@ def refusal(confirmation: Confirmation) -> str:
 def _unusable_size(confirmation: Confirmation) -> str:
     """Say what is wrong with the size of an effect; empty where nothing is."""
     if confirmation.within_rows:
-        return "it may be in the rows of the log alone, which repeat values: within a row nobody knows their instants"
+        return "it may be in the log alone: within a row, or behind a coarse stamp, nobody knows when it was measured"
     if confirmation.at_bound:
         return "its size is at the limit of what is physical"
     return "the refit leaves nothing of it" if confirmation.absent else ""

@@ -29,9 +29,9 @@ _NAMED = 3
 _REST = "; neither a known effect nor a smooth force of unknown origin improves on the rest"
 #: said where instants of measurement were found
 _LAID_OUT = (
-    "The rows of the logs do not show when in a row an instrument measured: here the manoeuvres are laid out at the "
-    "instants that fit the model best, so that errors are smaller than those of her stored parameter sets, which take "
-    "the middle of the row."
+    "The logs do not show when an instrument measured, only within which row or second: here the manoeuvres are laid "
+    "out at the instants that fit the model best, so that errors are smaller than those of her stored parameter sets, "
+    "which take the middle."
 )
 #: said of the free runs of such a ship
 _UNSTABLE = (

@@ -130,7 +130,7 @@ class _DecodeJob:
         self._settle_clocks(sample)
         for group in chain([sample], groups):
             self._correct(group)
-            decoded = group.decoded(self.log, first, tuple(self.places))
+            decoded = replace(group.decoded(self.log, first, tuple(self.places)), instant_std_s=self.corrected.std_s)
             first += group.size
             if not group.ends:
                 yield decoded

@@ -16,7 +16,7 @@ from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.shares import shares_of
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import date, time_of_day, year_month_day
-from kempf.schemas.nmea import SENTENCES
+from kempf.schemas.nmea import SATELLITES, SENTENCES
 from kempf.schemas.units import DAY_NS, SECOND_NS
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
@@ -43,6 +43,8 @@ class NmeaClock:
     time_utc_ns: Nanoseconds
     #: What a person should know of how they were found.
     notes: list[str]
+    #: Shape (n,). Within what time about it a sentence was said, ns; 0 where its instant is known.
+    share_ns: Nanoseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +97,10 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
         right = on_utc(stamps.time_utc_ns, full, believed)
         notes += [*stamps.notes, *differing, *right.notes]
         own = _nearest_day(times, right.time_utc_ns, notes)
-        return NmeaClock(np.where(own != NO_TIME, own, right.time_utc_ns), notes)
+        share = np.zeros(n, dtype=np.int64) if stamps.share_ns is None else stamps.share_ns
+        return NmeaClock(
+            np.where(own != NO_TIME, own, right.time_utc_ns), notes, np.where(own != NO_TIME, np.int64(0), share)
+        )
     speaks, differing = speaking(frames, dated, times.of_day)
     speaks, notes = speaks & times.timed, [*notes, *differing]
     own = _nearest_day(times, _by_counting_days(times, speaks), notes)
@@ -105,9 +110,8 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     fix = (own != NO_TIME) & speaks
     carrier = _next(fix) if follows else _latest(fix)
     carried = np.where((carrier >= 0) & (carrier < n), own[np.clip(carrier, 0, max(n - 1, 0))], NO_TIME)
-    return NmeaClock(
-        np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
-    )
+    delay, share = _delays(frames, said, own, fix, carried, follows, notes)
+    return NmeaClock(np.where(own != NO_TIME, own, carried + delay), notes, share)
 
 
 def _repeats(frames: Frames) -> Flag:
@@ -158,18 +162,24 @@ def _delays(
     carried: Nanoseconds,
     follows: bool,
     notes: list[str],
-) -> Nanoseconds:
-    """Return what is added to the time of the fix for the sentences that share it with others of their source."""
+) -> tuple[Nanoseconds, Nanoseconds]:
+    """Return what is added to the time of the fix for the sentences that share it with others of their source.
+
+    Beside it, within what time about that instant they were said: what a receiver says beside its fix is of the fix.
+    """
     source = _sources(frames, said, (own != NO_TIME) | (carried == NO_TIME))
     record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
-    delay, shared = _spread(own[at], at, record, source[record], follows=follows)
-    delays = np.zeros(own.size, dtype=np.int64)
-    delays[record] = delay
-    several = np.flatnonzero(np.bincount(frames.address[record[shared > 1]]))
+    spread = _spread(own[at], at, record, source[record], follows=follows)
+    delays, shares = np.zeros((2, own.size), dtype=np.int64)
+    delays[record] = spread.delay_ns
+    by_receiver = np.array([name[:2] in SATELLITES for name in frames.names], dtype=np.bool_)
+    # one that has the first instant of its share may have been said at any other of it
+    shares[record] = np.where(by_receiver[frames.address[record]], 0, 2 * spread.share_ns)
+    several = np.flatnonzero(np.bincount(frames.address[record[spread.several]]))
     if several.size:
         names = ", ".join(sorted(frames.names[code] for code in several))
         notes.append(f"Sentences that come several times between two fixes were spread evenly over it: {names}.")
-    return delays
+    return delays, shares
 
 
 def _sources(frames: Frames, said: dict[str, Said], timed: Flag) -> Index:
@@ -326,9 +336,19 @@ def _correct_rollover(full: Nanoseconds, dated: Flag, stamp: Nanoseconds) -> tup
     return full, int(np.sum(late))
 
 
-def _spread(
-    fix_ns: Nanoseconds, fix: Index, record: Index, source: Index, *, follows: bool
-) -> tuple[Nanoseconds, Index]:
+@dataclass(frozen=True, eq=False)
+class _Behind:
+    """How far behind their fix sentences were said."""
+
+    #: Shape (n,). To be added to the time of the fix; below zero where this follows them.
+    delay_ns: Nanoseconds
+    #: Shape (n,). Time between the fixes, divided by the sentences of the source that come in it.
+    share_ns: Nanoseconds
+    #: Shape (n,). Where more than one does.
+    several: Flag
+
+
+def _spread(fix_ns: Nanoseconds, fix: Index, record: Index, source: Index, *, follows: bool) -> _Behind:
     """Return how far behind their fix sentences were said.
 
     A receiver sends its fix once a second, a compass its heading ten times: the ten would all have the time of the fix.
@@ -342,15 +362,9 @@ def _spread(
         Records, ascending, of the sentences that were given the time of a fix, and which source they come from.
     follows : bool
         Whether they were given that of the fix behind them.
-
-    Returns
-    -------
-    delay_ns : ndarray of int64, shape (n,)
-        To be added to the time of the fix; below zero where ``follows``.
-    shared : ndarray of int64, shape (n,)
-        How many sentences of its source share its fix, itself among them.
     """
-    none = np.zeros(record.size, dtype=np.int64), np.ones(record.size, dtype=np.int64)
+    zero = np.zeros(record.size, dtype=np.int64)
+    none = _Behind(zero, zero, np.zeros(record.size, dtype=np.bool_))
     if fix.size == 0 or record.size == 0:
         return none
     opens = np.concatenate(([True], fix_ns[1:] != fix_ns[:-1]))
@@ -368,7 +382,7 @@ def _spread(
     shares = shares_of(source, epoch)
     shared, place = shares.shared, shares.place
     step = distance[epoch[shares.order]] // shared
-    result = np.empty((2, record.size), dtype=np.int64)
-    result[0, shares.order] = (place - (shared - 1)) * step if follows else place * step
-    result[1, shares.order] = shared
-    return result[0], result[1]
+    delay, share, several = np.empty_like(record), np.empty_like(record), np.empty(record.size, dtype=np.bool_)
+    delay[shares.order] = (place - (shared - 1)) * step if follows else place * step
+    share[shares.order], several[shares.order] = step, shared > 1
+    return _Behind(delay, share, several)

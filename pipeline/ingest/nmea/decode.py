@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Reason, Values
+from kempf.pipeline.ingest.bursts import unsure_s
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Flag, Nanoseconds, Reason, Values
 from kempf.pipeline.ingest.nmea.clock import clock_of
 from kempf.pipeline.ingest.nmea.compass_and_rudder import both_rudders, make_true
 from kempf.pipeline.ingest.nmea.fields import Said, read_type
@@ -70,7 +71,19 @@ def decode(data: bytes, corrections: Corrections = _NONE, variation_deg: float |
     time = np.where(unread, NO_TIME, clock.time_utc_ns)
     notes = [*clock.notes, *notes, *_notes(frames, kind, reason)]
     lines = np.arange(time.size, dtype=np.int64)
-    return Decoded(lines, frames.lines, frames.body, time, frames.address, frames.names, reason, channels, notes)
+    return Decoded(
+        *(lines, frames.lines, frames.body, time, frames.address, frames.names, reason, channels, notes),
+        instant_std_s=_instant_std_s(frames, clock.share_ns, (reason == 0) & (time != NO_TIME)),
+    )
+
+
+def _instant_std_s(frames: Frames, share_ns: Nanoseconds, read: Flag) -> dict[str, float]:
+    """Return the standard errors of the instants of sentences by address, s, where they are not known."""
+    if not share_ns.any():
+        return {}
+    address, share_ns = frames.address[read], share_ns[read]
+    found = {name: unsure_s(share_ns[address == code]) for code, name in enumerate(frames.names)}
+    return {name: std_s for name, std_s in found.items() if std_s > 0.0}
 
 
 def _kinds(frames: Frames) -> Index:

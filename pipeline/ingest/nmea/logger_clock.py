@@ -28,6 +28,9 @@ class LoggerTimes:
     time_utc_ns: Nanoseconds
     #: What a person should know of what was done to them.
     notes: tuple[str, ...] = ()
+    #: Shape (n,). Within what time about it a line was sent, ns, see `kempf.pipeline.ingest.bursts.Spread`; None where
+    #: each has its own stamp.
+    share_ns: Nanoseconds | None = None
 
 
 def put_evenly(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
@@ -53,7 +56,7 @@ def put_evenly(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
             f"The log's sentences come in bursts, every {found.lasting_ns / SECOND_NS:.3g} s (median): they were "
             "spread evenly over the time since the burst before."
         )
-    return LoggerTimes(found.time_ns, (note,))
+    return LoggerTimes(found.time_ns, (note,), found.share_ns)
 
 
 def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:

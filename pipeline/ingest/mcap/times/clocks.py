@@ -47,4 +47,4 @@ def put_right(topics: list[Arrivals], *, stamps_count: bool) -> Corrected:
         clocks = one_clock(waited, log)
         times |= clocks.times_ns
         notes += clocks.notes
-    return Corrected(times, tuple(notes))
+    return Corrected(times, tuple(notes), together.std_s)

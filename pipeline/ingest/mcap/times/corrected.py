@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from kempf.pipeline.ingest.decoded import Nanoseconds
 
@@ -15,3 +16,5 @@ class Corrected:
     times_ns: dict[str, Nanoseconds]
     #: What a person should know.
     notes: tuple[str, ...] = ()
+    #: Standard error of these times by source, s, where messages that came together were spread.
+    std_s: Mapping[str, float] = field(default_factory=dict)

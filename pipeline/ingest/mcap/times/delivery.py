@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from kempf.pipeline.ingest.bursts import TOGETHER_NS, are_whole, spread
+from kempf.pipeline.ingest.bursts import TOGETHER_NS, are_whole, spread, unsure_s
 from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Float, Nanoseconds
 from kempf.pipeline.ingest.mcap.times.arrivals import Arrivals
 from kempf.pipeline.ingest.mcap.times.corrected import Corrected
@@ -129,7 +129,11 @@ def bursts(topics: list[Arrivals], log_ns: Mapping[str, Nanoseconds]) -> Correct
     time[order] = result.time_ns
     cuts = np.cumsum([topic.record.size for topic in found])[:-1]
     times = {topic.source: own for topic, own in zip(found, np.split(time, cuts), strict=True)}
-    named = ", ".join(f"{name} ({_unsure_s(own):.2g} s)" for name, own in times.items())
+    share = np.empty_like(came)
+    share[order] = result.share_ns
+    shares = np.split(share, cuts)
+    std_s = {topic.source: unsure_s(own) for topic, own in zip(found, shares, strict=True)}
+    named = ", ".join(f"{name} ({own_s:.2g} s)" for name, own_s in std_s.items())
     how = "whole seconds" if result.whole else f"those of bursts, every {result.lasting_ns / SECOND_NS:.3g} s (median)"
     since = "each second" if result.whole else "the time since the burst before"
     return Corrected(
@@ -139,6 +143,7 @@ def bursts(topics: list[Arrivals], log_ns: Mapping[str, Nanoseconds]) -> Correct
             f"part of it (1 s.e.): {named}. Where the log has finer times, such as the `publish_time` or a field of "
             "the messages, name them as the column of `time`.",
         ),
+        std_s,
     )
 
 
@@ -147,11 +152,6 @@ def _several_a_second(log_ns: Nanoseconds, value: Float) -> bool:
     same = np.diff(log_ns) == 0
     enough = same.mean() >= _CLOSE and np.count_nonzero(~same) >= _LEAST // 4
     return bool(enough) and not _at_one_instant(value, same)
-
-
-def _unsure_s(time_ns: Nanoseconds) -> float:
-    """Return the standard error of an instant that lies anywhere within a reading's share of the time, s."""
-    return float(np.median(np.diff(time_ns))) / SECOND_NS / 12**0.5
 
 
 def _delivered_together(topics: list[Arrivals], log_ns: Mapping[str, Nanoseconds]) -> list[Arrivals]:
