@@ -106,14 +106,14 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
     groups = [group for group in groups if there.issuperset(_columns(group))]
     counts = _counts(frame, [*groups, *((name,) for group in groups if len(group) > 1 for name in group)])
-    stamped = dict(counts.select("source", pl.col("instant_std_s").fill_null(0.0)).iter_rows())
+    of_stamps = dict(counts.select("source", "instant_std_s").iter_rows())
     if counts["readings"].sum() <= _SHORT:
         frame = frame.collect().lazy()
     series: dict[str, Series] = {}
     sources: dict[str, str] = {}
     notes: list[str] = []
     unsure: dict[str, float] = {}
-    table = _Table.of(frame)
+    table = _Table.of(frame) if ROW in of_stamps else _Table(0, inf)
     for group in groups:
         offered = counts.filter(pl.col(_name(group)) > 0)
         if offered.is_empty():
@@ -129,7 +129,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         notes += own_notes
         series |= channels
         sources |= dict.fromkeys(channels, source)
-        if (std_s := hypot(held.std_s, stamped[source])) > 0.0:
+        if (std_s := hypot(held.std_s, of_stamps[source])) > 0.0:
             unsure |= dict.fromkeys(channels, std_s)
         if held.rows_per_value > 1:
             table.repeats = table.repeats or source == ROW
@@ -214,13 +214,13 @@ def _name(group: tuple[str, ...]) -> str:
 def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
     """Count the readings, and those that give all channels of a group: a row a source, sorted by name.
 
-    Beside it, what is known of the source's instants.
+    Beside it, how well the source's instants are known, in the median.
     """
     whole = [pl.all_horizontal(pl.col(_columns(g)).is_not_null()).sum().alias(_name(g)) for g in groups]
     return (
         frame.drop_nulls(["time_utc_ns", "source"])
         .group_by("source")
-        .agg(pl.len().alias("readings"), pl.col("instant_std_s").median(), *whole)
+        .agg(pl.len().alias("readings"), pl.col("instant_std_s").fill_null(0.0).median(), *whole)
         .sort("source")
         .collect()
     )

@@ -264,5 +264,5 @@ def _source_names(decoded: Decoded, record: Index) -> pl.Series:
 
 def _of_source(decoded: Decoded, record: Index, by_source: pl.Series) -> pl.Series:
     """Return what belongs to the source of each record; null of one without."""
-    code = decoded.source[record]
-    return by_source.extend_constant(None, 1).gather(np.where(code < 0, len(by_source), code))
+    code, without = decoded.source[record], len(by_source)
+    return by_source.extend_constant(None, 1).gather(np.where(code < 0, without, code))

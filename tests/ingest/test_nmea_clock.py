@@ -174,7 +174,8 @@ def test_sentences_faster_than_the_fix_are_spread_over_the_time_between_two():
         lines += [rmc(START + timedelta(seconds=k)), *(sentence(f"HEHDT,{k}.{j},T") for j in range(5))]
     readings = read(*lines)
     heading = readings.frame.filter(readings.frame["source"] == "HEHDT")["time_utc_ns"].to_numpy()
-    assert (heading - int(START.timestamp()) * 10**9).tolist() == [k * 200_000_000 for k in range(20)]
+    # each in the middle of its fifth
+    assert (heading - int(START.timestamp()) * 10**9).tolist() == [k * 200_000_000 + 100_000_000 for k in range(20)]
     assert readings.notes[0].endswith("spread evenly over it: HEHDT.")
 
 
@@ -186,13 +187,12 @@ def test_what_is_not_known_of_instants_without_a_stamp_is_kept_with_them():
         lines += [sentence("GPVTG,10.0,T,,M,8.0,N,14.8,K,A"), sentence(f"TIROT,{k / 10},A")]
     frame = read(*lines).frame
     std_s = dict(frame.group_by("source").agg(pl.col("instant_std_s").unique().item()).iter_rows())
-    # anywhere within a fifth of a second after its instant, and within a second
-    assert std_s == {
-        "GPRMC": None,
-        "GPVTG": None,
-        "HEHDT": pytest.approx(0.2 / 3**0.5),
-        "TIROT": pytest.approx(1.0 / 3**0.5),
-    }
+    # a fifth of a second; a second on either side; and up to half a second until a fix was sent
+    parts = {"HEHDT": 0.2, "TIROT": 2.0, "GPRMC": 1.0, "GPVTG": 1.0}
+    assert std_s == {source: pytest.approx(part_s / 12.0**0.5) for source, part_s in parts.items()}
+    # nothing else is dated by the fixes
+    frame = read(*(line for line in lines if line[3:6] in ("RMC", "VTG"))).frame
+    assert frame["instant_std_s"].is_null().all()
 
 
 def test_a_pause_of_the_log_is_not_filled():

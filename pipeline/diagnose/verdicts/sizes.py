@@ -24,16 +24,13 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     if chosen is None:
         return effect.title
     values, std, how = chosen
-    row_s = row_around_size(diagnosis, step, effect)
-    rows = (
-        ""
-        if row_s is None
-        else (
-            f"; this is less than the {row_s:.2g} s between rows: a table whose rows hold the last reading of each "
-            "instrument can show such a latency where there is none"
-        )
+    words, row_s = f"{_with_size(effect, values, std)}{how}", row_around_size(diagnosis, step, effect)
+    if row_s is None:
+        return words
+    return (
+        f"{words}; this is less than the {row_s:.2g} s between rows: a table whose rows hold the last reading of each "
+        "instrument can show such a latency where there is none"
     )
-    return f"{_with_size(effect, values, std)}{how}{rows}"
 
 
 def row_around_size(diagnosis: Diagnosis, step: Step, effect: Effect) -> float | None:

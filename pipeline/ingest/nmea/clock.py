@@ -31,6 +31,9 @@ ROLLOVER_NS = 1024 * 7 * DAY_NS
 #: A plain log that is longer than this is not looked at for late weeks of one of its receivers.
 _LONGEST_LOG_NS = 14 * DAY_NS
 
+#: A receiver sends what it measured within half of this time, ns, usually: so much about its instants are those of
+#: others that are dated by when it was sent.
+_SENDS_NS = SECOND_NS
 #: Sentences are spread over so many usual distances of the fixes at most: a longer one is a pause of the log.
 _PAUSE = 3
 
@@ -94,13 +97,14 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
         full = _by_stamps(times, stamps.time_utc_ns)
         dated &= stamps.time_utc_ns != NO_TIME
         believed, differing = fixes_of_one(frames, dated, stamps.time_utc_ns - full)
-        right = on_utc(stamps.time_utc_ns, full, believed)
-        notes += [*stamps.notes, *differing, *right.notes]
+        right = on_utc(stamps, full, believed)
+        notes += [*right.notes, *differing]
         own = _nearest_day(times, right.time_utc_ns, notes)
-        share = np.zeros(n, dtype=np.int64) if stamps.share_ns is None else stamps.share_ns
-        return NmeaClock(
-            np.where(own != NO_TIME, own, right.time_utc_ns), notes, np.where(own != NO_TIME, np.int64(0), share)
-        )
+        share = np.zeros(n, dtype=np.int64) if right.share_ns is None else right.share_ns
+        # all stamps are off the receiver's time alike: to the others, its fixes are
+        if not right.doubtful:
+            share = np.where(own != NO_TIME, np.int64(0), share)
+        return NmeaClock(np.where(own != NO_TIME, own, right.time_utc_ns), notes, share)
     speaks, differing = speaking(frames, dated, times.of_day)
     speaks, notes = speaks & times.timed, [*notes, *differing]
     own = _nearest_day(times, _by_counting_days(times, speaks), notes)
@@ -165,21 +169,32 @@ def _delays(
 ) -> tuple[Nanoseconds, Nanoseconds]:
     """Return what is added to the time of the fix for the sentences that share it with others of their source.
 
-    Beside it, within what time about that instant they were said: what a receiver says beside its fix is of the fix.
+    Beside it, within what time about these instants sentences were said. A velocity that is said with the fix is of it.
+    All others count from when it was sent, which to them makes the fix unsure.
     """
     source = _sources(frames, said, (own != NO_TIME) | (carried == NO_TIME))
     record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
     spread = _spread(own[at], at, record, source[record], follows=follows)
     delays, shares = np.zeros((2, own.size), dtype=np.int64)
-    delays[record] = spread.delay_ns
-    by_receiver = np.array([name[:2] in SATELLITES for name in frames.names], dtype=np.bool_)
-    # one that has the first instant of its share may have been said at any other of it
-    shares[record] = np.where(by_receiver[frames.address[record]], 0, 2 * spread.share_ns)
+    with_fix = _with_fix(frames)[record]
+    delays[record] = np.where(with_fix, 0, spread.delay_ns)
+    if not with_fix.all():
+        shares[own != NO_TIME] = _SENDS_NS
+        shares[record] = np.where(with_fix, _SENDS_NS, spread.share_ns)
     several = np.flatnonzero(np.bincount(frames.address[record[spread.several]]))
     if several.size:
         names = ", ".join(sorted(frames.names[code] for code in several))
         notes.append(f"Sentences that come several times between two fixes were spread evenly over it: {names}.")
     return delays, shares
+
+
+def _with_fix(frames: Frames) -> Flag:
+    """Return which lines are velocities over ground of a receiver that says its fix in RMC."""
+    talkers = {name[:2] for name in frames.names if name.endswith("RMC")}
+    if talkers & SATELLITES:
+        talkers |= SATELLITES
+    own = np.array([name[2:] == "VTG" and name[:2] in talkers for name in (*frames.names, "")], dtype=np.bool_)
+    return own[frames.address]
 
 
 def _sources(frames: Frames, said: dict[str, Said], timed: Flag) -> Index:
@@ -342,7 +357,7 @@ class _Behind:
 
     #: Shape (n,). To be added to the time of the fix; below zero where this follows them.
     delay_ns: Nanoseconds
-    #: Shape (n,). Time between the fixes, divided by the sentences of the source that come in it.
+    #: Shape (n,). Within what time about that they were said.
     share_ns: Nanoseconds
     #: Shape (n,). Where more than one does.
     several: Flag
@@ -352,7 +367,8 @@ def _spread(fix_ns: Nanoseconds, fix: Index, record: Index, source: Index, *, fo
     """Return how far behind their fix sentences were said.
 
     A receiver sends its fix once a second, a compass its heading ten times: the ten would all have the time of the fix.
-    Those of one source that come between two fixes are taken for evenly spaced.
+    Those of one source that come between two fixes are taken for evenly spaced, each in the middle of its share of the
+    time. One that comes alone may be of the fix itself, as where a logger asks all instruments in turn, or not.
 
     Parameters
     ----------
@@ -383,6 +399,7 @@ def _spread(fix_ns: Nanoseconds, fix: Index, record: Index, source: Index, *, fo
     shared, place = shares.shared, shares.place
     step = distance[epoch[shares.order]] // shared
     delay, share, several = np.empty_like(record), np.empty_like(record), np.empty(record.size, dtype=np.bool_)
-    delay[shares.order] = (place - (shared - 1)) * step if follows else place * step
-    share[shares.order], several[shares.order] = step, shared > 1
+    middle = (2 * (place - shared) + 1 if follows else 2 * place + 1) * step // 2
+    delay[shares.order] = np.where(shared > 1, middle, 0)
+    share[shares.order], several[shares.order] = np.where(shared > 1, step, 2 * step), shared > 1
     return _Behind(delay, share, several)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,8 @@ class LoggerTimes:
     #: Shape (n,). Within what time about it a line was sent, ns, see `kempf.pipeline.ingest.bursts.Spread`; None where
     #: each has its own stamp.
     share_ns: Nanoseconds | None = None
+    #: Whether how far the logger's clock is ahead of the receiver's is known to the share of a fix alone.
+    doubtful: bool = False
 
 
 def put_evenly(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
@@ -54,29 +56,34 @@ def put_evenly(stamp_ns: Nanoseconds, source: Index) -> LoggerTimes:
     else:
         note = (
             f"The log's sentences come in bursts, every {found.lasting_ns / SECOND_NS:.3g} s (median): they were "
-            "spread evenly over the time since the burst before."
+            "spread evenly over the time since the burst before, and one that comes once in each is known to a part of "
+            f"it (1 s.e.: {found.lasting_ns / SECOND_NS / 12.0**0.5:.2g} s)."
         )
     return LoggerTimes(found.time_ns, (note,), found.share_ns)
 
 
-def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:
+def on_utc(stamps: LoggerTimes, full_ns: Nanoseconds, fix: Flag) -> LoggerTimes:
     """Put stamps of a clock that is off on the receiver's UTC.
 
     How far the stamps of the fixes are ahead of the instants that the fixes give is the clock's error and the time that
     the receiver takes to send them. More than a second, or less than nothing, is the clock; it is followed through
     steps, as where it is set, and drift. A step that the receiver's time makes, while the stamps go on, is the
-    receiver's: it stands still, or learns of leap seconds.
+    receiver's: it stands still, or learns of leap seconds. Stamps that several sentences share show the lead to half of
+    their time, and are put right where no part of it will do.
 
     Parameters
     ----------
-    stamp_ns, full_ns : ndarray of int64, shape (n,)
-        Stamps, and what sentences say of date and time; `NO_TIME` where there is none.
+    stamps : LoggerTimes
+        As they are written, or spread.
+    full_ns : ndarray of int64, shape (n,)
+        What sentences say of date and time; `NO_TIME` where there is none.
     fix : ndarray of bool, shape (n,)
         Sentences that are believed.
     """
+    stamp_ns = stamps.time_utc_ns
     (at,) = np.nonzero(fix & (stamp_ns != NO_TIME) & (full_ns != NO_TIME))
     if at.size == 0:
-        return LoggerTimes(stamp_ns)
+        return stamps
     own, leapt = _without_leaps(stamp_ns[at], full_ns[at])
     lead = _followed(stamp_ns[at] - own)
     usual = int(np.sort(lead)[lead.size // 2])
@@ -86,13 +93,17 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     notes = [f"The receiver's time leaps or stands still at {leapt} of its fixes: the stamps are kept there."] * (
         leapt > 0
     )
+    notes = [*stamps.notes, *notes]
+    half = 0 if stamps.share_ns is None else int(np.median(stamps.share_ns[at])) // 2
     earliest, latest = ARRIVES_NS
+    doubtful = half > 0 and not (earliest <= lead.min() and lead.max() <= latest)
+    earliest, latest = earliest - half, latest + half
     if at.size < _FEWEST:
         few = f"The logger's stamps are {size}, by {at.size} of its fixes: too few to put them right."
-        return LoggerTimes(stamp_ns, () if earliest <= usual <= _WORTH_NS else (few,))
+        return replace(stamps, notes=(*notes, *(() if earliest <= usual <= _WORTH_NS + half else (few,))))
     if lead.min() >= earliest and lead.max() <= latest:
         late = f"The logger's stamps are {size}: its clock may be off, or the receiver sends so late. They were kept."
-        return LoggerTimes(stamp_ns, (*notes, *([late] if usual > _WORTH_NS else [])))
+        return replace(stamps, notes=(*notes, *([late] if usual > _WORTH_NS + half else [])), doubtful=doubtful)
     (record,) = np.nonzero(stamp_ns != NO_TIME)
     before = np.clip(np.searchsorted(at, record, side="right") - 1, 0, at.size - 1)
     after = np.clip(np.searchsorted(at, record), 0, at.size - 1)
@@ -108,7 +119,7 @@ def on_utc(stamp_ns: Nanoseconds, full_ns: Nanoseconds, fix: Flag) -> LoggerTime
     moved = int(lead.max() - lead.min())
     between = f", from {lead.min() / SECOND_NS:.3f} to {lead.max() / SECOND_NS:.3f} s" if moved > _WORTH_NS else ""
     right = f"The logger's clock is {size}{between}; its stamps were put right by it ({record.size})."
-    return LoggerTimes(result, (*notes, right))
+    return LoggerTimes(result, (*notes, right), stamps.share_ns, doubtful)
 
 
 def _without_leaps(stamp_ns: Nanoseconds, full_ns: Nanoseconds) -> tuple[Nanoseconds, int]:
