@@ -13,6 +13,7 @@ from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screening import unsure_instants
 from kempf.pipeline.diagnose.screening.nuisance import columns_of
+from kempf.pipeline.diagnose.screening.staged import staged
 from kempf.pipeline.diagnose.screening.unsure_instants import row_around, with_instants, within_rows
 from kempf.pipeline.diagnose.verdicts.diagnosis_json import as_json
 from kempf.pipeline.diagnose.verdicts.sizes import row_around_size, stated
@@ -32,7 +33,11 @@ from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
 #: what an instrument is late by, s, and which measurement shows it
 LATE_S = 0.2
-LATE = {"heading_latency": InstantErrors(heading_s=LATE_S), "gyro_latency": InstantErrors(yaw_rate_s=LATE_S)}
+LATE = {
+    "heading_latency": InstantErrors(heading_s=LATE_S),
+    "gyro_latency": InstantErrors(yaw_rate_s=LATE_S),
+    "dead_time": InstantErrors(rudder_s=LATE_S),
+}
 PLAIN = (EffectModel(), np.zeros(0))
 
 
@@ -162,8 +167,22 @@ def test_a_latency_of_the_model_is_known_no_better_than_the_instants() -> None:
     assert found.covariance[own, own] == pytest.approx(LATE_S**2, rel=0.2)
     assert found.fit.values[own - 6] == pytest.approx(fit.values[own - 6], abs=1e-3)
     effect = get("heading_latency")
-    assert within_rows(unsure, effect) == bool(abs(fit.values[-1]) < 12.0**0.5 * LATE_S)
-    assert not within_rows(fit, effect) and not within_rows(unsure, get("gyro_latency"))
+    assert within_rows(unsure, effect, found) == bool(abs(fit.values[-1]) < 12.0**0.5 * LATE_S)
+    exact = with_instants(fit, WORKERS)
+    assert not within_rows(fit, effect, exact) and not within_rows(unsure, get("gyro_latency"), exact)
+
+
+def test_a_rudder_lag_that_unsure_instants_can_make_is_within_them() -> None:
+    """A rudder read too early looks like one that lags by as little; a lag of seconds has a shape of its own."""
+    ship, lag = sailed(), get("rudder_lag")
+    right = fit_plain(ship.runs[:3], ship.spec, WORKERS).fit
+    early = staged([late(ship, right, "dead_time", run) for run in ship.runs[:3]], ship.spec, [lag], WORKERS)[1][-1]
+    slow = sailed("rudder_lag").diagnosis(("rudder_lag",)).steps[1].fit
+    for fit, within in ((early, True), (slow, False)):
+        assert fit.values[-1] > 2.0 * agreement_of(fit).widened * fit.std[-1]
+        unsure = _unsure(fit, LATE["dead_time"], tuple(filtered.run.day for filtered in fit.runs))
+        assert within_rows(unsure, lag, with_instants(unsure, WORKERS)) == within
+        assert not within_rows(fit, lag, with_instants(fit, WORKERS))
 
 
 def test_a_latency_of_less_than_a_row_may_be_how_the_table_was_written() -> None:

@@ -53,6 +53,8 @@ _STEP_S = 0.05
 #: standard deviations of an instant that lies anywhere in a row or a second: to its end, which is the most that it is
 #: moved, and over the whole of it, by which two instruments may be apart
 _MOST, _APART = 3.0**0.5, 12.0**0.5
+#: standard errors from which the size of an effect is seen
+_SEEN = 2.0
 #: how far beyond the most an instant may be found that lies there: it has an error, too
 _BEYOND = 1.25
 
@@ -176,8 +178,28 @@ def _unbound(fit: PooledFit, number: int, score: Float) -> Mask:
     return ~pressed(at, low, high, score)
 
 
-def within_rows(fit: PooledFit, effect: Effect) -> bool:
-    """Return whether the last effect of a fit is a latency no larger than what is not known of the instants."""
+def within_rows(fit: PooledFit, effect: Effect, found: WithInstants) -> bool:
+    """Return whether the last effect of a fit may be in the instants of its logs alone.
+
+    So may be a latency no larger than what is not known of them, and an effect of one parameter, such as a rudder lag,
+    whose size is seen where the instants are taken for exact and is not where they are free.
+
+    Parameters
+    ----------
+    found : WithInstants
+        The fit with its instants free.
+    """
+    return _is_within(fit, effect) or _is_lost(fit, effect, found)
+
+
+def _is_lost(fit: PooledFit, effect: Effect, found: WithInstants) -> bool:
+    if len(effect.parameters) != 1 or found.covariance[-1, -1] == 0.0:
+        return False
+    exact_std, free_std = agreement_of(fit).widened * fit.std[-1], found.std(1)[0]
+    return bool(abs(fit.values[-1]) >= _SEEN * exact_std and abs(found.fit.values[-1]) < _SEEN * free_std)
+
+
+def _is_within(fit: PooledFit, effect: Effect) -> bool:
     of = next((field for field, name in _LATE.items() if name == effect.name), None)
     if of is None:
         return False

@@ -70,7 +70,7 @@ class Confirmation:
     unseen: Unseen
     #: ``fit`` as it is stated.
     stated: WithInstants
-    #: Whether it is a latency that may be in the log alone, in rows that repeat values or behind coarse stamps.
+    #: Whether it may be in the instants of the log alone, in rows that repeat values or behind coarse stamps.
     within_rows: bool = False
     #: Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
     #: ``before``: none.
@@ -161,6 +161,7 @@ def confirm(
     outdone = not fit.converged and fit.log_likelihood < wanted
     after = before if outdone else unseen(fit, held, workers)
     usable = not outdone and bool(np.isfinite(fit.log_likelihood))
+    stated = with_instants(fit, workers) if usable else WithInstants(fit, np.zeros_like(fit.covariance))
     return Confirmation(
         fit=fit,
         likelihood_ratio=ratio,
@@ -171,8 +172,8 @@ def confirm(
         # what the refit gained is then a better hull's: it found another maximum
         absent=bool(np.all(nothing)),
         unseen=after,
-        stated=with_instants(fit, workers) if usable else WithInstants(fit, np.zeros_like(fit.covariance)),
-        within_rows=within_rows(fit, candidate.effect),
+        stated=stated,
+        within_rows=within_rows(fit, candidate.effect, stated),
         outdone=outdone,
     )
 
