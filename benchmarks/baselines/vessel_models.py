@@ -7,7 +7,6 @@ page says so.
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 import warnings
@@ -15,8 +14,6 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

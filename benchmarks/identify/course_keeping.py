@@ -8,12 +8,9 @@ each steers the true ship, of the independent simulator, through the same wind, 
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, replace
 from math import radians
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import matplotlib as mpl
 import numpy as np

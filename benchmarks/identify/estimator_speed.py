@@ -19,8 +19,6 @@ from importlib.util import find_spec
 from statistics import median
 from typing import Any
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import numpy as np
 
 from benchmarks import result_page

@@ -9,7 +9,6 @@ reports. From bytes on: `benchmarks.identify.monte_carlo`.
 from __future__ import annotations
 
 import argparse
-import os
 import pickle
 import sys
 from collections.abc import Sequence
@@ -19,8 +18,6 @@ from math import radians
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 

@@ -7,11 +7,8 @@ vary: how it ends, how far off it is, and how much of that the theory of errors 
 from __future__ import annotations
 
 import argparse
-import os
 from dataclasses import dataclass, replace
 from math import radians
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 
