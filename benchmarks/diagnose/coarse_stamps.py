@@ -16,6 +16,7 @@ import numpy as np
 
 from benchmarks import result_page
 from benchmarks.diagnose.diagnosed import CLAIMED, outcome_of
+from benchmarks.identify.prediction.plain_ship import two_zigzags, unset_clocks
 from benchmarks.ingest.restamped import Stamp, burst, restamped, whole_second
 from kempf.flows.jobs.identify.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify.vessel_runs import layout_of
@@ -26,7 +27,6 @@ from kempf.pipeline.diagnose.verdicts.diagnosis import diagnose
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
-from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial, zigzag_settings
 from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
@@ -35,8 +35,6 @@ from kempf.warehouse.storage.store import Warehouse
 
 _SHIPS = ("mariner", "container", "tanker", "ferry")
 _STAMPS: dict[str, Stamp | None] = {"whole seconds": whole_second, "bursts of a second": burst, "no stamps": None}
-#: How long the zigzags take, in the time in which she sails her own length.
-_LENGTHS = {20.0: 45.0, 10.0: 35.0}
 
 
 @dataclass(frozen=True)
@@ -47,23 +45,16 @@ class _Case:
 
 
 def _settings(case: _Case, day: int) -> TrialSettings:
-    hull = HULLS[case.hull]
-    own_s = hull.length_m / hull.trial_speed_m_s
     first = zigzag_settings(case.hull, seed=10 * case.seed + day)
-    # nobody sets the clocks of instruments by the second; a receiver measures on it
-    random = np.random.default_rng([20061, case.seed, day])
-    instruments = tuple(
-        one if one.name == "gnss" else replace(one, phase_s=max(one.jitter_s, float(random.uniform()) / one.rate_hz))
-        for one in first.instruments
+    # a receiver measures on the second
+    receiver, *others = first.instruments
+    return replace(
+        first,
+        programme=two_zigzags(HULLS[case.hull]),
+        instruments=(receiver, *unset_clocks(others, np.random.default_rng([20061, case.seed, day]))),
+        start_utc_ns=first.start_utc_ns + day * DAY_NS,
+        heading_deg=90.0 * day,
     )
-    programme = (
-        SteadyCourse(90.0),
-        ZigzagTest(20.0, 20.0, "starboard", duration_s=_LENGTHS[20.0] * own_s),
-        SteadyCourse(240.0, heading_deg=60.0),
-        ZigzagTest(10.0, 10.0, "port", duration_s=_LENGTHS[10.0] * own_s),
-    )
-    begin_ns = first.start_utc_ns + day * DAY_NS
-    return replace(first, programme=programme, instruments=instruments, start_utc_ns=begin_ns, heading_deg=90.0 * day)
 
 
 def _outcomes(case: _Case) -> tuple[str, str]:

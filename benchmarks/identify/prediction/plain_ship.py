@@ -8,7 +8,7 @@ in which every reading has its own instant.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, replace
 from math import degrees
 from pathlib import Path
@@ -125,15 +125,9 @@ def taken_in(hull: SimulatedHull, number: int, folder: Path, written: Written = 
     written : Written, optional
         Her log.
     """
-    own_s = hull.length_m / hull.trial_speed_m_s
-    steps = (
-        SteadyCourse(90.0),
-        ZigzagTest(20.0, 20.0, "starboard", duration_s=_LONGEST_LENGTHS[20.0] * own_s),
-        SteadyCourse(240.0, heading_deg=60.0),
-        ZigzagTest(10.0, 10.0, "port", duration_s=_LONGEST_LENGTHS[10.0] * own_s),
-    )
+    instruments = unset_clocks(DEFAULT_INSTRUMENTS, np.random.default_rng([_SEED, number, 1]))
     settings = TrialSettings(
-        hull, steps, PAPER_ENVIRONMENT, _instruments(number), seed=number, heading_deg=20.0 * number
+        hull, two_zigzags(hull), PAPER_ENVIRONMENT, instruments, seed=number, heading_deg=20.0 * number
     )
     name, bytes_of = written
     log = folder / name
@@ -143,12 +137,20 @@ def taken_in(hull: SimulatedHull, number: int, folder: Path, written: Written = 
     return warehouse
 
 
-def _instruments(number: int) -> tuple[Instrument, ...]:
-    """Return what a ship carries; nobody sets the clocks of her instruments by the rows of her log."""
-    random = np.random.default_rng([_SEED, number, 1])
-    return tuple(
-        replace(one, phase_s=max(one.jitter_s, float(random.uniform()) / one.rate_hz)) for one in DEFAULT_INSTRUMENTS
+def two_zigzags(hull: SimulatedHull) -> tuple[Step, ...]:
+    """Return a 20/20 and a 10/10 zigzag, each as long as its legs may take."""
+    own_s = hull.length_m / hull.trial_speed_m_s
+    return (
+        SteadyCourse(90.0),
+        ZigzagTest(20.0, 20.0, "starboard", duration_s=_LONGEST_LENGTHS[20.0] * own_s),
+        SteadyCourse(240.0, heading_deg=60.0),
+        ZigzagTest(10.0, 10.0, "port", duration_s=_LONGEST_LENGTHS[10.0] * own_s),
     )
+
+
+def unset_clocks(instruments: Sequence[Instrument], random: np.random.Generator) -> tuple[Instrument, ...]:
+    """Return instruments whose clocks nobody sets by the rows or the stamps of a log."""
+    return tuple(replace(one, phase_s=max(one.jitter_s, float(random.uniform()) / one.rate_hz)) for one in instruments)
 
 
 def _truth(hull: SimulatedHull) -> Truth:
